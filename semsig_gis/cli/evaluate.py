@@ -38,6 +38,7 @@ from semsig_gis.cli.options import (
     MapAge,
     NoiseName,
     OnGrid,
+    SurelyHere,
     read_noise,
 )
 from semsig_gis.core import LIKELIHOOD, InputError
@@ -75,6 +76,7 @@ def evaluate(
     noise: NoiseName = "generic",
     map_age: MapAge = 0.0,
     drift_report: DriftReport = None,
+    surely_here: SurelyHere = False,
     top: Annotated[
         int,
         typer.Option(min=1, max=MOST_QUERIES, help="Count the best of this many candidates (t)."),
@@ -96,6 +98,7 @@ def evaluate(
             "--noise": noise != "generic",
             "--map-age": map_age,
             "--drift-report": drift_report,
+            "--surely-here": surely_here,
         }
         for option in (name for name, value in likelihood_options.items() if value):
             raise InputError(
@@ -139,6 +142,7 @@ def evaluate(
             distortion=chain,
             top=top,
             seed=seed,
+            surely_here=surely_here,
             progress=advance,
         )
     if out is not None:

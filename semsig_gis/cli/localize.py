@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -53,6 +53,9 @@ if TYPE_CHECKING:
     )
     from semsig_gis.observation import North, QueryLine, View
 
+PLACES = ("near", "area", "popularity", "objects")
+"""Options for the places of a single city."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RankedOptions(QueryOptions):
@@ -100,6 +103,13 @@ class RankedOptions(QueryOptions):
 class LocalizeOptions(SearchOptions, RankedOptions):
     """The options of `semsig localize`."""
 
+    more: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[DATABASE]... [SEEN]",
+            help="More databases before what was seen: the view may be from any of these cities.",
+        ),
+    ] = None
     top: Top = 10
     explain: Explain = False
     map_: Annotated[Path | None, typer.Option("--map", help="Map to write (.html).")] = None
@@ -158,6 +168,28 @@ class LocalizeOptions(SearchOptions, RankedOptions):
         """Whether --out is a raster with the chances of all cells, without regions."""
         return self.out is not None and self.out.suffix.lower() in {".tif", ".tiff"}
 
+    def by_city(self) -> tuple[LocalizeOptions, ...]:
+        """Return the options for each database if there are several, else none."""
+        texts = [text for text in (self.seen, *(self.more or ())) if text is not None]
+        databases = [text for text in texts if text.endswith(".parquet") or Path(text).is_dir()]
+        if databases != texts[: len(databases)] or len(texts) > len(databases) + 1:
+            raise InputError(
+                f"{' and '.join(map(repr, texts))} were given after the first database; give more "
+                "databases, and then what was seen as one text."
+            )
+        if not databases:
+            return ()
+        seen = texts[-1] if len(texts) > len(databases) else None
+        alone = ("queries", "explain", "map_", "out", *PLACES)
+        given = [f"--{name.strip('_')}" for name in alone if getattr(self, name)]
+        if given or self.ranking != LIKELIHOOD:
+            raise InputError(
+                f"several databases were given with {' and '.join(given or ['--method'])}, which "
+                "needs a single one; leave out one or the other."
+            )
+        paths = (self.database, *map(Path, databases))
+        return tuple(replace(self, database=path, seen=seen, more=None) for path in paths)
+
     def _refuse_likelihood(self) -> None:
         """Raise InputError for options that work only with the likelihood method."""
         names = [field.name for field in fields(SearchOptions) if field.name != "require"]
@@ -182,6 +214,9 @@ def localize(options: LocalizeOptions) -> None:
     """
     from semsig_gis.database import open_city
 
+    if several := options.by_city():
+        _answer_by_city(several)
+        return
     method, ranking = None, options.ranking
     if ranking != LIKELIHOOD:
         from semsig_gis.localization import Method
@@ -211,6 +246,63 @@ def localize(options: LocalizeOptions) -> None:
         city, north, usual_noise=noise, top=options.top, explain=options.explain
     )
     _answer_lines(lines, locator, options)
+
+
+def _answer_by_city(several: Sequence[LocalizeOptions]) -> None:
+    """Answer a query that may be from any of some cities, and print the answer."""
+    from semsig_gis.database import open_city
+    from semsig_gis.localization import locate_in_areas
+
+    locators, queries = [], []
+    for options in several:
+        city = open_city(options.database)
+        queries.append(options.query(city.dataset))
+        north = query_north(city, options.north, options.date)
+        locator = _locator(options, city, None, north)
+        others = options.unplaced(city.dataset)
+        locators.append(_with_unplaced(locator, queries[-1], *others, ranking=LIKELIHOOD))
+    first = several[0]
+    with progress("answering"):
+        locations, elsewhere = locate_in_areas(locators, queries, surely_here=first.surely_here)
+    names = [str(options.database) for options in several]
+    cities = list(zip(names, locations, strict=True))
+    name, best = max(cities, key=lambda pair: pair[1].answer.mass)
+    rows = [
+        {"city": name, **candidate}
+        for name, location in cities
+        for candidate in location.to_dict()["candidates"]
+    ]
+    rows = sorted(rows, key=lambda row: -row["chance"])[: first.top]
+    for rank, row in enumerate(rows, 1):
+        row["rank"] = rank
+    chances = {name: 1.0 - location.elsewhere for name, location in cities}
+    if first.as_json:
+        shared = {"city": name, "cities": chances, "elsewhere": elsewhere, "candidates": rows}
+        print_json(best.to_dict() | shared)
+        return
+    cells = sum(location.cells for location in locations)
+    print_rows(
+        f"{len(rows)} best places in {cells:,} cells of {len(cities)} cities, by likelihood "
+        f"({best.noise} noise)",
+        ("rank", "city", "cell", "lon", "lat", "chance", "types"),
+        [
+            *(
+                (
+                    *(row["rank"], row["city"], row["cell_id"]),
+                    *(f"{row['lon']:.6f}", f"{row['lat']:.6f}"),
+                    *(percent(row["chance"]), row["types"]),
+                )
+                for row in rows
+            ),
+            ("", "elsewhere", "", "", "", percent(elsewhere), ""),
+        ],
+    )
+    for city, chance in chances.items():
+        say(f"{city}: chance {percent(chance)}.")
+    say(f"In {name}:")
+    print_place(best)
+    print_query(best)
+    print_notes(*locations)
 
 
 def _with_unplaced(

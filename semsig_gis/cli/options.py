@@ -101,6 +101,14 @@ Refine = Annotated[
         show_default=False,
     ),
 ]
+SurelyHere = Annotated[
+    bool,
+    typer.Option(
+        "--surely-here",
+        help="Assume that views are from the area of the database. Otherwise the chance that they "
+        "are from elsewhere is 50 % before their objects are compared.",
+    ),
+]
 Smooth = Annotated[
     float | None,
     typer.Option(
@@ -305,6 +313,7 @@ class SearchOptions:
             "of 0.9]"
         ),
     ] = None
+    surely_here: SurelyHere = False
     refine: Refine = None
     objects: Objects = None
 
@@ -346,7 +355,12 @@ class SearchOptions:
             drift_report=self.drift_report,
         )
         method = LikelihoodMethod(
-            noise=noise, refined=bool(refined), on_grid=self.on_grid, north_sigma=sigma
+            noise=noise,
+            refined=bool(refined),
+            on_grid=self.on_grid,
+            north_sigma=sigma,
+            # A known place is in the area.
+            surely_here=self.surely_here or self.near is not None or self.area is not None,
         )
         log_prior, knowledge = self._prior(city.database)
         needed = bool(self.refine)

@@ -82,6 +82,7 @@ def evaluate(
     distortion: str | QueryDistortion | Sequence[QueryDistortion] = "medium",
     top: int = 1,
     seed: int = 0,
+    surely_here: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
     """SimulatedQuery a database with distorted signatures of its own cells and score the answers.
@@ -103,6 +104,8 @@ def evaluate(
         Number of best candidates that count (t); 1 to the number of cells.
     seed : int, default 0
         Random seed; 0 or more. Query number i is the same whatever the number of queries.
+    surely_here : bool, default False
+        Whether the likelihood method assumes that queries are from this database, as they are.
     progress : callable, optional
         Called with the number of finished queries and the number of queries.
 
@@ -154,6 +157,8 @@ def evaluate(
         raise InputError(
             "the likelihood index belongs to another database; build it for the database to search."
         )
+    if surely_here and isinstance(ranking, LikelihoodMethod):
+        ranking = replace(ranking, surely_here=True)
     locator = make_locator(database, ranking, index=index)
     announce(queries * (QUERY_S + QUERY_CELL_S * len(database)), "evaluating")
     sample = draw_queries(database, spec)

@@ -58,6 +58,10 @@ from .likelihood.association import associate_pairs as associate_pairs
 from .likelihood.association import near_pairs as near_pairs
 from .likelihood.association import rerank as rerank
 from .likelihood.association import score_associations as score_associations
+from .likelihood.elsewhere import area_chances as area_chances
+from .likelihood.elsewhere import background_loglik as background_loglik
+from .likelihood.elsewhere import evidence_ratio as evidence_ratio
+from .likelihood.elsewhere import goodness_of_fit as goodness_of_fit
 from .likelihood.estimate import PlaceEstimate as PlaceEstimate
 from .likelihood.estimate import cell_estimate as cell_estimate
 from .likelihood.estimate import refined_estimate as refined_estimate
@@ -75,6 +79,7 @@ from .likelihood.kernels import promising_cells as promising_cells
 from .likelihood.locate import LikelihoodLocator as LikelihoodLocator
 from .likelihood.locate import Location as Location
 from .likelihood.locate import locate as locate
+from .likelihood.locate import locate_in_areas as locate_in_areas
 from .likelihood.locate import locate_route as locate_route
 from .likelihood.method import LikelihoodMethod as LikelihoodMethod
 from .likelihood.off_centre import visible_objects_off_centre as visible_objects_off_centre

@@ -163,6 +163,7 @@ def make_locator(
         between = options.get("store") is not None and not method.on_grid
         options["refined"] = method.refined or (None if between else False)
     options.setdefault("north_sigma", method.north_sigma)
+    options.setdefault("surely_here", method.surely_here)
     return LikelihoodLocator(index=index or method_index(database, method), **options)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import rasterio
 import shapely
-from pyproj import Transformer
+from pyproj import CRS, Transformer
 from sentences import sentence
 from worlds import CORNER, World, random_town
 
@@ -49,6 +49,46 @@ def view_from(xy: np.ndarray) -> dict[str, Any]:
 
 def options(view: dict[str, Any]) -> tuple[str, ...]:
     return ("--types", view["types"], "--bearings", ",".join(map(str, view["bearings"])))
+
+
+def test_a_view_from_any_of_several_cities(city: Path, tmp_path: Path, run: Run) -> None:
+    other = random_town(5, count=150).database
+    moved = dataclasses.replace(other, crs=CRS("EPSG:32631"), licenses=("Other (CC0)",))
+    save_database(moved, tmp_path / "other.parquet")
+    cities = str(tmp_path / "other.parquet"), str(city)
+    code, out, _ = run("localize", *cities, *options(VIEW), "--json", "--top", 4)
+    assert code == 0
+    answer = json.loads(out)
+    assert answer["city"] == cities[1]
+    assert answer["answered"]
+    assert math.dist((answer["place"]["x"], answer["place"]["y"]), PLACE) < 10.0
+    assert sum(answer["cities"].values()) + answer["elsewhere"] == pytest.approx(1.0)
+    assert [row["rank"] for row in answer["candidates"]] == [1, 2, 3, 4]
+    chances = [row["chance"] for row in answer["candidates"]]
+    assert chances == sorted(chances, reverse=True)
+    # What was seen comes last; north is that of each city.
+    out = run("localize", *cities, "lamp", "--noise", "light", "--north", "true")[1]
+    assert "elsewhere" in out
+    assert {row["city"] for row in answer["candidates"]} <= set(cities)
+    for name in cities:
+        assert f"{name}: chance " in out
+    code, out, _ = run("localize", *cities, *options(VIEW), "--surely-here", "--json")
+    assert json.loads(out)["elsewhere"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (("city.parquet", "bench", "lamp"), "give more databases"),
+        (("bench", "city.parquet"), "give more databases"),
+        (("city.parquet", "bench", "--near", "1,2,3"), "several databases were given with --near"),
+        (("city.parquet", "bench", "--method", "edit+edit"), "databases were given with --method"),
+    ],
+)
+def test_databases_come_before_what_was_seen(
+    city: Path, run: Run, given: tuple[str, ...], words: str
+) -> None:
+    sentence(run("localize", city, *given), words)
 
 
 def written(path: Path, rows: list[dict[str, Any]]) -> Path:
@@ -87,7 +127,9 @@ def test_answer_and_priors_are_printed(city: Path, run: Run) -> None:
     out = run(*query, "--noise", "medium", "--heading", "unknown", "--top", 2)[1]
     for words in ("2 best places in", "Position: x", "North of the query: ", "over 99 %"):
         assert words in out
-    code, out, _ = run("localize", city, "--types", VIEW["types"][:1])
+    short = "localize", city, "--types", VIEW["types"][:1]
+    assert "90 % region, if it is from this area: " in run(*short)[1]
+    code, out, _ = run(*short, "--surely-here")
     assert code == 0
     assert "Cannot tell. 90 % region: " in out
     assert out.index("Cannot tell") < out.index("Best place: ") < out.index("If it is there: x ")

@@ -306,15 +306,18 @@ def test_stated_probabilities_are_calibrated_if_the_model_is_right() -> None:
     noise = NoiseSpec(detection=0.8, misnamed=0.1, clutter=0.7, bearing_sigma=12.0, name="mine")
     detector = SimulatedDetector(noise=noise)
     method = build_index(cells, noise)
-    evaluation = evaluate(cells, queries=300, method=method, distortion=detector)
+    asked: dict[str, Any] = {"queries": 300, "method": method}
+    doubted = evaluate(cells, distortion=detector, **asked)
+    evaluation = evaluate(cells, distortion=detector, surely_here=True, **asked)
     answers = evaluation.queries.dropna(subset=["chance"])
+    assert (doubted.queries["chance"].dropna() <= answers["chance"] + 1e-9).all()
     spread = math.sqrt(float((answers["chance"] * (1.0 - answers["chance"])).sum()))
     assert abs(float((answers["right"] - answers["chance"]).sum())) < 4.0 * spread
     assert 0.2 < answers["chance"].mean() < 0.95
     assert 0.86 < answers["in_region"].mean() < 0.99
     # If the detector is worse than its noise model, the stated probabilities are too high.
     bad = SimulatedDetector(noise=replace(noise, detection=0.5, clutter=3.0, bearing_sigma=30.0))
-    wrong = evaluate(cells, queries=300, method=method, distortion=bad).queries
+    wrong = evaluate(cells, distortion=bad, surely_here=True, **asked).queries
     assert wrong["chance"].mean() > wrong["right"].mean() + 0.1
 
 

@@ -80,6 +80,10 @@ class CellScores:
         """The headings of the first photo."""
         return self.headings[0]
 
+    def headings_at(self, cell: int) -> list[float]:
+        """Return the heading of each photo in a cell, 0 where its north is known."""
+        return [0.0 if turns is None else float(turns[cell]) for turns in self.headings]
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class LikelihoodIndex(Displayed):

@@ -28,12 +28,16 @@ from semsig_gis.localization.answers import (
 )
 from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.localization.likelihood.association import QUICK_SAMPLE, SAMPLE, rerank
+from semsig_gis.localization.likelihood.elsewhere import (
+    area_chances,
+    evidence_ratio,
+    goodness_of_fit,
+)
 from semsig_gis.localization.likelihood.estimate import cell_estimate, refined_estimate
 from semsig_gis.localization.likelihood.explain import explain, explain_cell
 from semsig_gis.localization.likelihood.index import CellScores
 from semsig_gis.localization.likelihood.posterior import (
     DIVIDED_PARTS,
-    Posterior,
     posterior,
     prior_ratio,
     refine,
@@ -55,7 +59,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.explain import Explanation
     from semsig_gis.localization.likelihood.incremental import IncrementalIndex
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.likelihood.posterior import Places, Refinement
+    from semsig_gis.localization.likelihood.posterior import Places, Posterior, Refinement
     from semsig_gis.observation import Leg, North
 
 DISAGREEMENT = 0.01
@@ -285,6 +289,7 @@ class LikelihoodLocator:
     north: North = GRID_NORTH
     quick: bool = False
     incremental: IncrementalIndex | None = None
+    surely_here: bool = False
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -308,8 +313,14 @@ class LikelihoodLocator:
         if self.log_prior is not None:
             without_prior = self.scores(query, scanned=scanned)
             ratio = prior_ratio(without_prior.loglik, self.log_prior)
-        top = top or self.top
-        return self._location(query, scores, chances, top=top, store=store, ratio=ratio)
+        elsewhere = self._elsewhere([query], chances)
+        return self._location(
+            *(query, scores, chances),
+            top=top or self.top,
+            store=store,
+            ratio=ratio,
+            elsewhere=elsewhere,
+        )
 
     def locate_route(
         self,
@@ -334,8 +345,9 @@ class LikelihoodLocator:
             logliks[0] = self.scores(queries[0], scanned=scanned).loglik
             start = route_posteriors(database, logliks, legs)[0].chances
             ratio = prior_ratio(np.log(np.maximum(start, TINY)), log_prior)
+        elsewhere = self._elsewhere(queries, chances[0])
         return tuple(
-            self._location(*view, top=self.top, store=store, ratio=ratio)
+            self._location(*view, top=self.top, store=store, ratio=ratio, elsewhere=elsewhere)
             for view in zip(queries, scores, chances, strict=True)
         )
 
@@ -406,6 +418,17 @@ class LikelihoodLocator:
         blind = any(query.bearings is None and len(query) for query in queries)
         return self.store if self.refined or (self.refined is None and not blind) else None
 
+    def _elsewhere(self, queries: Sequence[Signature], posterior: Posterior) -> float:
+        """Return the chance that some views, all from one area, are not from that of the cells."""
+        if self.surely_here:
+            return 0.0
+        return float(area_chances([self.evidence_ratio(queries, posterior)])[-1])
+
+    def evidence_ratio(self, queries: Sequence[Signature], posterior: Posterior) -> float:
+        """Return how much likelier some views are in this area than elsewhere, as a logarithm."""
+        usable = list(map(self._usable_objects, queries))
+        return evidence_ratio(self.index, usable, posterior.log_evidence)
+
     def _location(
         self,
         query: Signature,
@@ -415,6 +438,7 @@ class LikelihoodLocator:
         top: int,
         store: ObjectStore | None,
         ratio: float | None,
+        elsewhere: float,
     ) -> Location:
         """Return the answer from the chances of the cells, refined if a store is given."""
         parts = None
@@ -442,7 +466,9 @@ class LikelihoodLocator:
             )
         columns = _columns(scores, posterior, places)
         first = columns["cell"].tolist()[: self.explained if len(usable) else 0]
-        return Location(
+        (best,) = posterior.likeliest(1).tolist()
+        fit = goodness_of_fit(self.index, usable, best, scores.headings_at(best))
+        location = Location(
             query=query,
             noise=noise.name,
             columns=columns,
@@ -466,6 +492,7 @@ class LikelihoodLocator:
             prior_ratio=ratio,
             north=self.north,
         )
+        return location.doubted(elsewhere, fit)
 
     def parts(
         self, query: Signature, scores: CellScores, posterior: Posterior, store: ObjectStore
@@ -493,7 +520,7 @@ class LikelihoodLocator:
         """Explain a query at a cell: at its likeliest part, or at its centre."""
         query = self.north.to_grid(query)
         database, noise = self.index.database, self.index.noise
-        headings = [0.0 if turns is None else float(turns[cell]) for turns in scores.headings]
+        headings = scores.headings_at(cell)
         if self.store is None:
             return explain_cell(query, cell, noise, database=database, heading=headings)
         x, y = database.xy[cell].tolist()
@@ -526,6 +553,7 @@ class LocateOptions(TypedDict, total=False):
     explained: int
     known: Mapping[str, Any]
     north: North
+    surely_here: bool
 
 
 def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOptions]) -> Location:
@@ -548,7 +576,9 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         chance of a cell is the sum over its parts. ``explained`` (0) is the number of candidates
         to explain; without a store, street objects have no identifiers. ``known`` describes the
         prior in the answer, in plain values. The ``north`` is the direction from which bearings
-        count, grid north by default.
+        count, grid north by default. ``surely_here`` is whether views are surely from the area of
+        the database; otherwise they are from elsewhere with a chance of 0.5 before their objects
+        are compared (see `likelihood.elsewhere`).
 
     Returns
     -------
@@ -578,6 +608,33 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
     True
     """
     return LikelihoodLocator(index=index, **options).locate(query)
+
+
+def locate_in_areas(
+    locators: Sequence[LikelihoodLocator],
+    queries: Sequence[Signature],
+    *,
+    surely_here: bool = False,
+) -> tuple[tuple[Location, ...], float]:
+    """Locate a query in several areas: return the answer of each, and the chance of elsewhere.
+
+    `queries` is the query for each locator, in the classes of its database. The chances of places
+    in all areas and of elsewhere add up to 1; `surely_here` is whether the query is surely from one
+    of the areas, whatever the locators have.
+    """
+    views = list(zip(locators, queries, strict=True))
+    locations = [replace(locator, surely_here=True).locate(query) for locator, query in views]
+    chances = area_chances(
+        [
+            locator.evidence_ratio([query], location.posterior)
+            for (locator, query), location in zip(views, locations, strict=True)
+        ]
+    )
+    if surely_here:
+        chances = np.append(chances[:-1] / chances[:-1].sum(), 0.0)
+    *areas, elsewhere = chances.tolist()
+    answers = zip(locations, areas, strict=True)
+    return tuple(place.doubted(1.0 - area, place.fit) for place, area in answers), elsewhere
 
 
 def locate_route(
@@ -665,7 +722,7 @@ def _with_parts(
         order = np.argsort(parts.chances, kind="stable")  # the likeliest part comes last
         heading[owners[order]] = parts.headings[order]
     parted = CellScores(loglik=loglik, headings=(heading, *scores.headings[1:]))
-    return parted, Posterior(database=database, chances=chances)
+    return parted, replace(before, chances=chances)
 
 
 def _owners(parts: Refinement, database: SignatureDatabase) -> NDArray[np.int64]:

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
     from semsig_gis.localization.noise.model import Noise
 
+SWITCHES = ("refined", "on_grid", "surely_here")
+"""Settings that are on or off."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LikelihoodMethod:
@@ -31,6 +34,8 @@ class LikelihoodMethod:
     north_sigma : float, default 0
         Standard deviation in degrees of the north of a query, 0 or 0.001 to 360; infinite if not
         known.
+    surely_here : bool, default False
+        Whether views are surely from the area of the database.
 
     Examples
     --------
@@ -42,6 +47,7 @@ class LikelihoodMethod:
     refined: bool = False
     on_grid: bool = False
     north_sigma: float = 0.0
+    surely_here: bool = False
 
     def __post_init__(self) -> None:  # noqa: D105
         check_north(self.north_sigma)
@@ -52,9 +58,10 @@ class LikelihoodMethod:
     def parse(cls, text: str, *, noises: Mapping[str, Noise] = NOISES) -> LikelihoodMethod:
         """Read a method from the text that `str` writes.
 
-        It is ``likelihood``, or ``likelihood:NOISE``, then any of ``:refined``, ``:on_grid`` and
-        ``:heading=DEGREES`` or ``:heading=unknown``; `noises` are the noise models by name. Raises
-        UnknownNameError for another noise model, and InputError if the text has another form.
+        It is ``likelihood``, or ``likelihood:NOISE``, then any of ``:refined``, ``:on_grid``,
+        ``:surely_here`` and ``:heading=DEGREES`` or ``:heading=unknown``; `noises` are the noise
+        models by name. Raises UnknownNameError for another noise model, and InputError if the text
+        has another form.
         """
         _, *options = text.strip().split(":")
         noise = options.pop(0) if options else "generic"
@@ -66,15 +73,14 @@ class LikelihoodMethod:
             )
         misread = (
             f"method {text!r} cannot be read; give 'likelihood:NOISE' and optionally ':refined', "
-            "':on_grid', ':heading=10' (degrees) or ':heading=unknown'."
+            "':on_grid', ':surely_here', ':heading=10' (degrees) or ':heading=unknown'."
         )
-        refined, on_grid, north_sigma = False, False, 0.0
+        switches: set[str] = set()
+        north_sigma = 0.0
         for option in options:
             key, _, value = option.partition("=")
-            if option == "refined":
-                refined = True
-            elif option == "on_grid":
-                on_grid = True
+            if option in SWITCHES:
+                switches.add(option)
             elif key == "heading" and value:
                 try:
                     north_sigma = math.inf if value == "unknown" else float(value)
@@ -82,12 +88,12 @@ class LikelihoodMethod:
                     raise InputError(misread) from error
             else:
                 raise InputError(misread)
-        return cls(noise=noises[noise], refined=refined, on_grid=on_grid, north_sigma=north_sigma)
+        return cls(noise=noises[noise], north_sigma=north_sigma, **dict.fromkeys(switches, True))
 
     def __str__(self) -> str:
         """Return the text that `parse` reads."""
         parts = [LIKELIHOOD, self.noise.name]
-        parts += [name for name in ("refined", "on_grid") if getattr(self, name)]
+        parts += [name for name in SWITCHES if getattr(self, name)]
         if self.north_sigma:
             heading = str(self.north_sigma).removesuffix(".0")
             parts.append(f"heading={heading if math.isfinite(self.north_sigma) else 'unknown'}")

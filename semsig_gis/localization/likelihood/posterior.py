@@ -60,6 +60,9 @@ class Posterior(Displayed):
     ----------
     database, chances : SignatureDatabase, and ndarray of float64, shape (n,)
         The cells, and their chances, which sum to one.
+    log_evidence : float, default NaN
+        Logarithm of the likelihood of the query in this area: its mean over the prior. That of a
+        route is for all its views. NaN if not known.
 
     Examples
     --------
@@ -70,6 +73,7 @@ class Posterior(Displayed):
 
     database: SignatureDatabase
     chances: NDArray[np.float64]
+    log_evidence: float = math.nan
 
     def _facts(self) -> dict[str, object]:
         (best,) = self.likeliest(1).tolist()
@@ -301,7 +305,12 @@ def posterior(
     if top == -np.inf:
         raise InputError("the prior excludes every cell that the query may be in; widen it.")
     chances = np.exp(total - top)
-    return Posterior(database=database, chances=chances / chances.sum())
+    prior = math.log(total.size) if log_prior is None else np.logaddexp.reduce(log_prior)
+    return Posterior(
+        database=database,
+        chances=chances / chances.sum(),
+        log_evidence=float(top + np.log(chances.sum()) - prior),
+    )
 
 
 def prior_ratio(loglik: NDArray[np.floating], log_prior: NDArray[np.float64]) -> float:

@@ -49,13 +49,15 @@ def route_posteriors(
             "one leg between each view and the next."
         )
     first = posterior(database, logliks[0], log_prior=log_prior)
-    likely = [first.chances, *(posterior(database, part).chances for part in logliks[1:])]
+    views = [first, *(posterior(database, part) for part in logliks[1:])]
+    likely = [view.chances for view in views]
     size = len(database)
     # Forward: from the first view to the last.
-    forward = [likely[0]]
-    for here, leg in zip(likely[1:], legs, strict=True):
+    forward, log_evidence = [likely[0]], first.log_evidence
+    for here, leg in zip(views[1:], legs, strict=True):
         came = moved_chances(database, forward[-1], leg)
-        both = here * ((1.0 - LOST) * came + LOST / size)
+        both = here.chances * ((1.0 - LOST) * came + LOST / size)
+        log_evidence += here.log_evidence + math.log(size * both.sum())
         forward.append(both / both.sum())
     # Backward: from the last view to the first, with reversed legs.
     backward = np.ones(size)
@@ -68,7 +70,10 @@ def route_posteriors(
         backward = (1.0 - LOST) * back + LOST / size
         both = forward[row] * backward
         chances.append(both / both.sum())
-    return tuple(Posterior(database=database, chances=view) for view in reversed(chances))
+    return tuple(
+        Posterior(database=database, chances=view, log_evidence=log_evidence)
+        for view in reversed(chances)
+    )
 
 
 def moved_chances(
