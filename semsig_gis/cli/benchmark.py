@@ -22,27 +22,29 @@ from semsig_gis.cli.console import (
 )
 from semsig_gis.cli.learn import estimate_noise
 from semsig_gis.cli.localize import LocalizeOptions, query_locator
+from semsig_gis.cli.options import adapted_noise
 from semsig_gis.core import LIKELIHOOD, InputError, UnknownNameError, nearest_name, percent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     import pandas as pd
 
     from semsig_gis.database import City
-    from semsig_gis.evaluation import PhotographData
+    from semsig_gis.evaluation import Photograph, PhotographData
     from semsig_gis.localization import Locator
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Task:
-    """What a method may use: the data with its folder and city, --noise, and a folder to write."""
+    """What a method may use: the data with its folder, city and views, --noise, a folder to write."""
 
     data: PhotographData
     folder: Path
     city: City
     noise: Path | None
     scratch: Path
+    views: Mapping[str, Sequence[Photograph]]
 
 
 def _learnt(task: _Task) -> dict[str, Any]:
@@ -75,7 +77,7 @@ def _adapted(task: _Task) -> dict[str, Any]:
     from semsig_gis.localization import save_noise
 
     (first, *_) = task.views.values()
-    views = [view for _, view in first]
+    views = [photograph.view for photograph in first]
     path = task.scratch / "adapted.toml"
     save_noise(adapted_noise(task.city, views, "photo", None, "known"), path)
     return {"noise": str(path)}
@@ -85,6 +87,7 @@ METHODS: Mapping[str, Callable[[_Task], dict[str, Any]]] = {
     "paper": lambda _: {"paper": True},
     "default": lambda _: {},
     "generic": lambda _: {"noise": "generic"},
+    "adapted": _adapted,
     "learned": _learnt,
 }
 """The options of `semsig localize` for each method."""
@@ -141,7 +144,7 @@ def benchmark(
             )
             for name, file in files.views.items()
         }
-        task = _Task(data=files, folder=folder, city=city, noise=noise, scratch=scratch)
+        task = _Task(data=files, folder=folder, city=city, noise=noise, scratch=scratch, views=sets)
         locators = {name: _locator(name, task) for name in names}
         with progress("locating") as advance:
             scored = score_photographs(locators, sets, progress=advance)

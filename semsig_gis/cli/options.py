@@ -14,11 +14,11 @@ from semsig_gis.cli.console import Database, app, numbers, remark
 from semsig_gis.core import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence, Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core import Taxonomy
+    from semsig_gis.core import Signature, Taxonomy
     from semsig_gis.database import City, ObjectStore, PartitionedDatabase, SignatureDatabase
     from semsig_gis.localization import Drift, LikelihoodLocator, Noise
     from semsig_gis.observation import North, View
