@@ -253,14 +253,16 @@ def _answer_by_city(several: Sequence[LocalizeOptions]) -> None:
     from semsig_gis.database import open_city
     from semsig_gis.localization import locate_in_areas
 
-    locators, queries = [], []
+    locators: list[LikelihoodLocator] = []
+    queries: list[View] = []
     for options in several:
         city = open_city(options.database)
         queries.append(options.query(city.dataset))
         north = query_north(city, options.north, options.date)
-        locator = _locator(options, city, None, north)
+        locator: Locator[Any] = query_locator(options, city, None, north, queries[-1])
         others = options.unplaced(city.dataset)
-        locators.append(_with_unplaced(locator, queries[-1], *others, ranking=LIKELIHOOD))
+        own: Any = _with_unplaced(locator, queries[-1], *others, ranking=LIKELIHOOD)
+        locators.append(own)
     first = several[0]
     with progress("answering"):
         locations, elsewhere = locate_in_areas(locators, queries, surely_here=first.surely_here)
@@ -297,8 +299,8 @@ def _answer_by_city(several: Sequence[LocalizeOptions]) -> None:
             ("", "elsewhere", "", "", "", percent(elsewhere), ""),
         ],
     )
-    for city, chance in chances.items():
-        say(f"{city}: chance {percent(chance)}.")
+    for area, chance in chances.items():
+        say(f"{area}: chance {percent(chance)}.")
     say(f"In {name}:")
     print_place(best)
     print_query(best)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core import BEARING_UNITS, FULL_TURN, signed_degrees
+from semsig_gis.localization.likelihood.index import photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable
 from semsig_gis.observation import View
 
@@ -93,7 +94,7 @@ def background_loglik(index: LikelihoodIndex, query: Signature) -> float:
         likely = weights * scores
         total += math.log(likely.sum() / weights.sum())
         weights = weights + likely / likely.sum()
-    return total
+    return total * photo_power(len(photos), index.noise)
 
 
 def _number_log(number: int, width: float) -> float:
