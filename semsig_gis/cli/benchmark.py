@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class _Task:
-    """What a method may use: the data, its folder, city and views, --noise, and a folder to write."""
+    """What a method may use: the data, its folder, city and views, --noise, a scratch folder."""
 
     data: PhotographData
     folder: Path
