@@ -88,7 +88,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_methods_are_measured_and_written(folder: Path, run_ok: RunOk) -> None:
-    out = run_ok("benchmark flatlandia . --out result.json")
+    out = run_ok("benchmark flatlandia . --methods paper,default,generic,learned --out result.json")
     assert "Real photographs" in out
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     assert (result["data"], result["radius"], result["limit"]) == ("flatlandia", 60.0, None)

@@ -402,6 +402,29 @@ def test_ranges_and_fading_are_learnt_and_printed(city: Path, run: Run) -> None:
     assert open_noise(out).to_dict()["range_sigma"] == pytest.approx(0.2, abs=0.02)
 
 
+def test_noise_is_learnt_from_views_of_unknown_places(city: Path, run: Run) -> None:
+    rows = [
+        {name: row[name] for name in ("types", "bearings")}
+        for row in samples(60)
+        if len(row["types"]) >= 3
+    ][:30]
+    views, out = written(city.with_name("views.jsonl"), rows), city.with_name("noise.toml")
+    learn = "learn", city, "--out", out
+    code, printed, err = run(*learn, "--unlabelled", views, "--noise", "by-hand")
+    assert code == 0, err
+    assert f"noise model: {out}" in printed
+    assert "30 views" in err
+    assert open_noise(out).name == "noise"
+    for given in ((), ("--samples", views, "--unlabelled", views)):
+        sentence(run(*learn, *given), "--unlabelled")
+    code, printed, err = run("localize", city, "--queries", views, "--adapt", "--top", 1)
+    assert code == 0, err
+    answers = [json.loads(line) for line in printed.splitlines()]
+    assert len(answers) == len(rows)
+    assert {answer["noise"] for answer in answers} <= {"adapted", "photo"}
+    sentence(run("localize", city, *options(VIEW), "--adapt"), "--queries")
+
+
 def test_map_age_is_printed_and_corrects_learnt_noise(city: Path, run: Run) -> None:
     fewer = city.with_name("fewer.parquet")
     objects = WORLD.street_objects
