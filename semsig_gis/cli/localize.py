@@ -165,16 +165,16 @@ class LocalizeOptions(SearchOptions, RankedOptions):
             )
         if not databases:
             return ()
-        seen = texts[-1] if len(texts) > len(databases) else None
-        alone = ("queries", "explain", "map_", "out", *PLACES)
-        given = [f"--{name.strip('_')}" for name in alone if getattr(self, name)]
-        if given or self.ranking != LIKELIHOOD:
+        view_text = texts[-1] if len(texts) > len(databases) else None
+        names = ("queries", "explain", "map_", "out", *PLACES)
+        extra = [f"--{name.strip('_')}" for name in names if getattr(self, name)]
+        if extra or self.ranking != LIKELIHOOD:
             raise InputError(
-                f"several databases were given with {' and '.join(given or ['--method'])}, which "
+                f"several databases were given with {' and '.join(extra or ['--method'])}, which "
                 "needs a single one; leave out one or the other."
             )
         paths = (self.database, *map(Path, databases))
-        return tuple(replace(self, database=path, seen=seen, more=None) for path in paths)
+        return tuple(replace(self, database=path, seen=view_text, more=None) for path in paths)
 
     def _refuse_likelihood(self) -> None:
         """Raise InputError for options that work only with the likelihood method."""
@@ -227,7 +227,8 @@ def _answer_by_city(several: Sequence[LocalizeOptions]) -> None:
     from semsig_gis.database import open_city
     from semsig_gis.localization import locate_in_areas
 
-    locators, queries = [], []
+    locators: list[Any] = []
+    queries: list[View] = []
     for options in several:
         city = open_city(options.database)
         queries.append(options.query(city.dataset))
@@ -271,8 +272,8 @@ def _answer_by_city(several: Sequence[LocalizeOptions]) -> None:
             ("", "elsewhere", "", "", "", percent(elsewhere), ""),
         ],
     )
-    for city, chance in chances.items():
-        say(f"{city}: chance {percent(chance)}.")
+    for place, chance in chances.items():
+        say(f"{place}: chance {percent(chance)}.")
     say(f"In {name}:")
     print_place(best)
     print_query(best)
