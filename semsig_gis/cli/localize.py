@@ -179,16 +179,16 @@ class LocalizeOptions(SearchOptions, RankedOptions):
             )
         if not databases:
             return ()
-        seen = texts[-1] if len(texts) > len(databases) else None
-        alone = ("queries", "explain", "map_", "out", *PLACES)
-        given = [f"--{name.strip('_')}" for name in alone if getattr(self, name)]
-        if given or self.ranking != LIKELIHOOD:
+        view_text = texts[-1] if len(texts) > len(databases) else None
+        names = ("queries", "explain", "map_", "out", *PLACES)
+        extra = [f"--{name.strip('_')}" for name in names if getattr(self, name)]
+        if extra or self.ranking != LIKELIHOOD:
             raise InputError(
-                f"several databases were given with {' and '.join(given or ['--method'])}, which "
+                f"several databases were given with {' and '.join(extra or ['--method'])}, which "
                 "needs a single one; leave out one or the other."
             )
         paths = (self.database, *map(Path, databases))
-        return tuple(replace(self, database=path, seen=seen, more=None) for path in paths)
+        return tuple(replace(self, database=path, seen=view_text, more=None) for path in paths)
 
     def _refuse_likelihood(self) -> None:
         """Raise InputError for options that work only with the likelihood method."""
