@@ -77,6 +77,13 @@ def evaluate(
     map_age: MapAge = 0.0,
     drift_report: DriftReport = None,
     surely_here: SurelyHere = False,
+    foreign: Annotated[
+        Path | None,
+        typer.Option(
+            help="Database of another city: also count how many of its views are answered, which "
+            "is wrong for all of them."
+        ),
+    ] = None,
     top: Annotated[
         int,
         typer.Option(min=1, max=MOST_QUERIES, help="Count the best of this many candidates (t)."),
@@ -91,7 +98,7 @@ def evaluate(
 ) -> None:
     """Measure how often, and how closely, queries from known places are located."""
     require_suffix(".html", report)
-    keep_inputs(report, read=[database, drift_report])
+    keep_inputs(report, read=[database, drift_report, foreign])
     ranking = chosen_method(method, paper=paper)
     if ranking != LIKELIHOOD:
         likelihood_options = {
@@ -99,6 +106,7 @@ def evaluate(
             "--map-age": map_age,
             "--drift-report": drift_report,
             "--surely-here": surely_here,
+            "--foreign": foreign,
         }
         for option in (name for name, value in likelihood_options.items() if value):
             raise InputError(
@@ -108,7 +116,13 @@ def evaluate(
     import dataclasses
 
     from semsig_gis.database import open_city
-    from semsig_gis.evaluation import Distortion, parse_chain, save_evaluation
+    from semsig_gis.evaluation import (
+        Distortion,
+        foreign_answers,
+        parse_chain,
+        plain_records,
+        save_evaluation,
+    )
     from semsig_gis.evaluation import evaluate as run
     from semsig_gis.localization import Method, build_index
     from semsig_gis.reports import evaluation_headline, evaluation_tables
@@ -145,6 +159,8 @@ def evaluate(
             surely_here=surely_here,
             progress=advance,
         )
+    others = None if foreign is None else open_city(foreign).database
+    table = None if others is None else foreign_answers(evaluation, city.database, others)
     if out is not None:
         save_evaluation(evaluation, out)
     if report is not None:
@@ -154,10 +170,17 @@ def evaluate(
             )
             write_page(page, report)
     if as_json:
-        print_json(evaluation.summary())
+        rows = {} if table is None else {"foreign": plain_records(table)}
+        print_json(evaluation.summary() | rows)
         return
     say(evaluation_headline(evaluation))
     print_tables(evaluation_tables(evaluation))
+    if table is not None:
+        print_rows(
+            "Views of this city and of another",
+            ("objects in the view", "own", "answered", "foreign", "answered"),
+            table.round(3).astype(object).fillna("").to_numpy().tolist(),
+        )
     if out is not None:
         say(f"results: {out}")
     if report is not None:

@@ -108,6 +108,7 @@ from .result import Evaluation as Evaluation
 from .result import PlotKind as PlotKind
 from .result import machine as machine
 from .scoring import evaluate as evaluate
+from .scoring import foreign_answers as foreign_answers
 from .scoring import score_queries as score_queries
 from .scoring import scored_tables as scored_tables
 from .spec import Districts as Districts

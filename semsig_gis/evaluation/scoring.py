@@ -25,10 +25,12 @@ from semsig_gis.core import (
     cell_ids,
     wrap_degrees,
 )
+from semsig_gis.evaluation.figures import LENGTHS, range_labels
 from semsig_gis.evaluation.queries.distortion_text import QueryDistortion, parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count, draw_queries
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
 from semsig_gis.localization import (
+    DEFAULT_RULE,
     NEAR_METRES,
     NEAR_PLACES,
     THRESHOLDS,
@@ -196,6 +198,37 @@ def score_queries(
         if progress is not None:
             progress(count, len(queries))
     return outcomes
+
+
+def foreign_answers(
+    evaluation: Evaluation, database: SignatureDatabase, foreign: SignatureDatabase
+) -> pd.DataFrame:
+    """Return how many queries of an evaluation, and of another city like them, are answered.
+
+    One row for each range of the number of objects in the query: ``objects``, the number of
+    queries, ``own`` and ``foreign``, and the shares of them that are ``answered`` and
+    ``answered_foreign``. Both databases may be in any CRS; `database` is the searched one.
+    """
+    spec = replace(evaluation.asked, number=min(evaluation.asked.number, len(foreign)))
+    sample = draw_queries(database, spec, city=replace(foreign, crs=database.crs))
+    outcomes = score_queries(database, make_locator(database, evaluation.method), sample)
+    tables = evaluation.queries, scored_tables(database, sample, outcomes)[1]
+    own, others = (
+        (table["chance"] >= DEFAULT_RULE.threshold)
+        .groupby(range_labels(table["query_length"].to_numpy(), LENGTHS))
+        .agg(["size", "mean"])
+        .reindex(list(LENGTHS))
+        for table in tables
+    )
+    return pd.DataFrame(
+        {
+            "objects": LENGTHS,
+            "own": own["size"].fillna(0).astype(int).to_numpy(),
+            "answered": own["mean"].to_numpy(),
+            "foreign": others["size"].fillna(0).astype(int).to_numpy(),
+            "answered_foreign": others["mean"].to_numpy(),
+        }
+    )
 
 
 def scored_tables(

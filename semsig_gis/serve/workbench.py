@@ -377,8 +377,8 @@ class Workbench:
         if question.near is not None:
             place = KnownPosition.parse(question.near, self.database)
             prior = position_prior(self.database, (place.x, place.y), sigma=place.sigma)
-            known = {"near": place.to_dict()}
-            locator = replace(locator, log_prior=prior, known=known, surely_here=True)
+            locator = replace(locator, log_prior=prior, surely_here=True)
+            locator = replace(locator, known={"near": place.to_dict()})
         return with_unplaced(locator, question.views[0], absent=question.absent)
 
     def _is_quick(self, question: Question) -> bool:

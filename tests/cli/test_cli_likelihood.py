@@ -53,8 +53,8 @@ def options(view: dict[str, Any]) -> tuple[str, ...]:
 
 def test_a_view_from_any_of_several_cities(city: Path, tmp_path: Path, run: Run) -> None:
     other = random_town(5, count=150).database
-    moved = dataclasses.replace(other, crs=CRS("EPSG:32631"), licenses=("Other (CC0)",))
-    save_database(moved, tmp_path / "other.parquet")
+    other_zone = dataclasses.replace(other, crs=CRS("EPSG:32631"), licenses=("Other (CC0)",))
+    save_database(other_zone, tmp_path / "other.parquet")
     cities = str(tmp_path / "other.parquet"), str(city)
     code, out, _ = run("localize", *cities, *options(VIEW), "--json", "--top", 4)
     assert code == 0
@@ -77,7 +77,7 @@ def test_a_view_from_any_of_several_cities(city: Path, tmp_path: Path, run: Run)
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("arguments", "words"),
     [
         (("city.parquet", "bench", "lamp"), "give more databases"),
         (("bench", "city.parquet"), "give more databases"),
@@ -86,9 +86,9 @@ def test_a_view_from_any_of_several_cities(city: Path, tmp_path: Path, run: Run)
     ],
 )
 def test_databases_come_before_what_was_seen(
-    city: Path, run: Run, given: tuple[str, ...], words: str
+    city: Path, run: Run, arguments: tuple[str, ...], words: str
 ) -> None:
-    sentence(run("localize", city, *given), words)
+    sentence(run("localize", city, *arguments), words)
 
 
 def written(path: Path, rows: list[dict[str, Any]]) -> Path:
@@ -432,6 +432,11 @@ def test_map_age_is_printed_and_corrects_learnt_noise(city: Path, run: Run) -> N
     assert rules[0].threshold != rules[1].threshold
     folder = city.with_name("evaluation")
     assert run("evaluate", city, *old, "--queries", 20, "--out", folder)[0] == 0
+    command = "evaluate", city, "--queries", 20, "--foreign", city
+    assert "Views of this city and of another" in run(*command)[1]
+    rows = json.loads(run(*command, "--json")[1])["foreign"]
+    assert [row["own"] for row in rows] == [row["foreign"] for row in rows]
+    sentence(run(*command, "--paper"), "--foreign works only with the likelihood method")
     method = open_evaluation(folder).method
     assert str(method) == "likelihood:2-year-old map with generic:on_grid"
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from noisy_cells import database_of, random_database
+from pyproj import CRS
 from sentences import refused
 from worlds import random_town
 
@@ -24,6 +25,7 @@ from semsig_gis.evaluation import (
     compare_evaluations,
     draw_queries,
     evaluate,
+    foreign_answers,
 )
 from semsig_gis.localization import (
     NEAR_PLACES,
@@ -306,9 +308,9 @@ def test_stated_probabilities_are_calibrated_if_the_model_is_right() -> None:
     noise = NoiseSpec(detection=0.8, misnamed=0.1, clutter=0.7, bearing_sigma=12.0, name="mine")
     detector = SimulatedDetector(noise=noise)
     method = build_index(cells, noise)
-    asked: dict[str, Any] = {"queries": 300, "method": method}
-    doubted = evaluate(cells, distortion=detector, **asked)
-    evaluation = evaluate(cells, distortion=detector, surely_here=True, **asked)
+    settings: dict[str, Any] = {"queries": 300, "method": method}
+    doubted = evaluate(cells, distortion=detector, **settings)
+    evaluation = evaluate(cells, distortion=detector, surely_here=True, **settings)
     answers = evaluation.queries.dropna(subset=["chance"])
     assert (doubted.queries["chance"].dropna() <= answers["chance"] + 1e-9).all()
     spread = math.sqrt(float((answers["chance"] * (1.0 - answers["chance"])).sum()))
@@ -317,7 +319,7 @@ def test_stated_probabilities_are_calibrated_if_the_model_is_right() -> None:
     assert 0.86 < answers["in_region"].mean() < 0.99
     # If the detector is worse than its noise model, the stated probabilities are too high.
     bad = SimulatedDetector(noise=replace(noise, detection=0.5, clutter=3.0, bearing_sigma=30.0))
-    wrong = evaluate(cells, distortion=bad, surely_here=True, **asked).queries
+    wrong = evaluate(cells, distortion=bad, surely_here=True, **settings).queries
     assert wrong["chance"].mean() > wrong["right"].mean() + 0.1
 
 
@@ -458,3 +460,25 @@ def test_common_cases_are_paired_by_name() -> None:
     assert both == {"b": PAIR}
     with refused(InputError, "a, b", "c, a single evaluation"):
         common_cases({"a": FIRST, "b": FIRST}, {"c": SECOND, "": SECOND})
+
+
+def test_few_views_of_another_city_are_answered() -> None:
+    city, other = (random_town(seed, count=150).database for seed in (1, 2))
+    other = replace(other, crs=CRS("EPSG:32631"))
+    detector = SimulatedDetector(noise=named_noise("by-hand"))
+    index = build_index(city, named_noise("by-hand"))
+    for surely_here in (False, True):
+        settings: dict[str, Any] = {
+            "queries": 80,
+            "distortion": detector,
+            "surely_here": surely_here,
+        }
+        table = foreign_answers(evaluate(city, method=index, **settings), city, other)
+        assert table["objects"].tolist() == ["1-4", "5-9", "10-19", "20+"]
+        assert table["own"].sum() <= 80
+        own, foreign = (
+            (table[share].fillna(0.0) * table[count]).sum()
+            for share, count in (("answered", "own"), ("answered_foreign", "foreign"))
+        )
+        assert own > 15
+        assert (foreign <= 2) != surely_here

@@ -74,12 +74,11 @@ def background_loglik(index: LikelihoodIndex, query: Signature) -> float:
     view, table = View.of(query), index.table
     if view.bearings is None:
         counts = np.bincount(table.query_rows(view))
-        known = len(view) - int(counts[len(table.codes) :].sum())
+        unknown = int(counts[len(table.codes) :].sum())
         # The likelihood is that of numbers by class, not of one object after the other.
         total = _number_log(len(view), 1.0) - sum(map(_log_factorial, counts.tolist()))
-        total += sum(
-            number * math.log(number / len(view)) for number in (known, len(view) - known) if number
-        )
+        parts = (unknown, len(view) - unknown)
+        total += sum(part * math.log(part / len(view)) for part in parts if part)
         view = View(view.codes, np.zeros(len(view)))
         photos = [PhotoTable.of(view, table)]
     else:
@@ -128,17 +127,17 @@ def goodness_of_fit(
     for photo, heading in zip(view.split(), headings, strict=True):
         detections = PhotoTable.of(photo, index.table)
         look = photo.photos[0].turned(heading)
-        seen = look.sees(BINS) if look.sectors else np.ones(len(BINS), np.bool_)
+        inside = look.sees(BINS) if look.sectors else np.ones(len(BINS), np.bool_)
         rows = ((detections.bearings + heading) % FULL_TURN).astype(np.int64)
         for row, scores in zip(rows.tolist(), detections.scores.T, strict=True):
             total += math.log(scores @ mean[:, row])
-            drawn = []
+            bins = []
             for density, count in zip(densities, counts.tolist(), strict=True):
-                chances = np.cumsum(density[:, seen])
-                drawn.append(np.searchsorted(chances, random.random(count) * chances[-1]))
+                chances = np.cumsum(density[:, inside])
+                bins.append(np.searchsorted(chances, random.random(count) * chances[-1]))
             # Of an object of unknown class, only the direction is compared.
             logs = np.log(mean.sum(axis=0) + 0.0 * mean if scores.all() else mean)
-            simulated += logs[:, seen].ravel()[np.concatenate(drawn)]
+            simulated += logs[:, inside].ravel()[np.concatenate(bins)]
     return float(np.mean(simulated <= total + ROUNDING))
 
 

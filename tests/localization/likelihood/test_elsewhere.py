@@ -61,8 +61,8 @@ def test_the_evidence_is_the_mean_likelihood() -> None:
     here = posterior(CITY, loglik)
     assert here.log_evidence == pytest.approx(math.log(np.exp(loglik).mean()))
     weights = np.exp(prior) / np.exp(prior).sum()
-    known = posterior(CITY, loglik, log_prior=prior).log_evidence
-    assert known == pytest.approx(math.log(weights @ np.exp(loglik)))
+    evidence = posterior(CITY, loglik, log_prior=prior).log_evidence
+    assert evidence == pytest.approx(math.log(weights @ np.exp(loglik)))
     # Two views from one place.
     stay = Leg(dx=0.0, dy=0.0, sigma=0.0)
     for view in route_posteriors(CITY, [loglik, other], [stay], log_prior=prior):
@@ -115,8 +115,8 @@ def test_views_of_another_city_are_recognized(north_sigma: float) -> None:
     locator = LikelihoodLocator(index=build_index(city, noise), north_sigma=north_sigma)
     spec = QuerySpec(number=60, distortions=(SimulatedDetector(noise=noise),))
     chances = []
-    for seen in (city, other):
-        queries = [query.asked for query in draw_queries(city, spec, city=seen)]
+    for observed_city in (city, other):
+        queries = [query.asked for query in draw_queries(city, spec, city=observed_city)]
         views = [sight.signature for sight in queries if len(sight) > 7]
         chances.append(np.array([locator.locate(view).elsewhere for view in views]))
         assert len(views) > 15
@@ -137,9 +137,9 @@ def test_a_view_is_located_in_several_cities(surely_here: bool) -> None:  # noqa
     assert (elsewhere == 0.0) == surely_here
     assert [location.answer.given for location in locations] == [False, True, False]
     # In one city, the answer is that of the locator.
-    (alone,), elsewhere = locate_in_areas(locators[1:2], [query])
-    assert elsewhere == pytest.approx(alone.elsewhere)
-    assert alone.elsewhere == pytest.approx(locators[1].locate(query).elsewhere)
+    (single,), elsewhere = locate_in_areas(locators[1:2], [query])
+    assert elsewhere == pytest.approx(single.elsewhere)
+    assert single.elsewhere == pytest.approx(locators[1].locate(query).elsewhere)
     # Without objects, cities share the chance of a view from any of them.
     locations, elsewhere = locate_in_areas(locators, [NOTHING] * 3)
     assert elsewhere == pytest.approx(0.5)
