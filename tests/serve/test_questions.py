@@ -180,7 +180,9 @@ def test_marks_of_photos_are_localized(page: Page, heading: float | None) -> Non
     assert answer["truth"]["metres"] < 10
     assert answer["truth"]["rank"] <= 3
     assert answer["region"]["text"].startswith("90 % region: ")
-    assert (answer["elsewhere"], answer["fit"], answer["doubt"]) == (0.0, None, "")
+    assert answer["elsewhere"] < 1e-9
+    assert answer["fit"] > 0.5
+    assert not answer["doubt"]
     assert list(answer["region"]["counts"]) == ["0.99", "0.9", "0.5"]
     first, *others = answer["candidates"]
     assert len(others) == 2
