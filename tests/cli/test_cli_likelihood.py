@@ -415,8 +415,8 @@ def test_noise_is_learnt_from_views_of_unknown_places(city: Path, run: Run) -> N
     assert f"noise model: {out}" in printed
     assert "30 views" in err
     assert open_noise(out).name == "noise"
-    for given in ((), ("--samples", views, "--unlabelled", views)):
-        sentence(run(*learn, *given), "--unlabelled")
+    for options_ in ((), ("--samples", views, "--unlabelled", views)):
+        sentence(run(*learn, *options_), "--unlabelled")
     code, printed, err = run("localize", city, "--queries", views, "--adapt", "--top", 1)
     assert code == 0, err
     answers = [json.loads(line) for line in printed.splitlines()]

@@ -42,9 +42,9 @@ def noise_with_objects_beyond(noise: Noise, database: SignatureDatabase) -> Nois
             if metres[-1] <= limit:
                 continue
             beyond = np.arange(limit, metres[-1], STEP_M) + STEP_M / 2.0
-            seen = np.interp(beyond, metres, remaining) * 2.0 * np.pi * beyond * STEP_M
+            amounts = np.interp(beyond, metres, remaining) * 2.0 * np.pi * beyond * STEP_M
             detection = spec.detection_by_class.get(item.name, spec.detection)
-            clutter[item.name] += float(density * detection * seen.sum())
+            clutter[item.name] += float(density * detection * amounts.sum())
             inside = metres < limit
             fading[item.name] = (
                 *zip(metres[inside].tolist(), remaining[inside].tolist(), strict=True),

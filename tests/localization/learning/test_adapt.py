@@ -34,10 +34,10 @@ def town() -> Town:
     views = []
     for cell in dice.permutation(len(database)):
         signature = database.signature(int(cell))
-        seen = dice.random(len(signature)) < SEEN
-        if seen.sum() >= 4:
-            detected = signature.select(np.flatnonzero(seen))
-            bearings = (detected.bearings + dice.normal(0.0, SIGMA, seen.sum())) % 360.0
+        mask = dice.random(len(signature)) < SEEN
+        if mask.sum() >= 4:
+            detected = signature.select(np.flatnonzero(mask))
+            bearings = (detected.bearings + dice.normal(0.0, SIGMA, mask.sum())) % 360.0
             views.append(View(detected.codes, bearings))
         if len(views) == VIEWS:
             break

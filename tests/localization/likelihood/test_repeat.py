@@ -28,9 +28,9 @@ def test_repeated_photos_count_as_one_without_repeat() -> None:
 
 
 def test_photos_are_independent_by_default() -> None:
-    one = build_index(DATABASE, NOISE).scores(view_of(1)).loglik
-    two = build_index(DATABASE, NOISE).scores(view_of(2)).loglik
-    np.testing.assert_allclose(2.0 * one, two, rtol=1e-5)
+    single = build_index(DATABASE, NOISE).scores(view_of(1)).loglik
+    pair = build_index(DATABASE, NOISE).scores(view_of(2)).loglik
+    np.testing.assert_allclose(2.0 * single, pair, rtol=1e-5)
 
 
 @pytest.mark.parametrize("repeat", [0.25, 0.5, 0.75])
