@@ -96,7 +96,7 @@ chances: $(DEV) ## whether stated chances come true, on old maps too: figures, a
 	$(BIN)/python -m benchmarks.tables
 
 photographs: $(DEV) ## methods on the real photographs in SEMSIG_GEODATA: figures, half an hour
-	$(BIN)/semsig benchmark flatlandia $(SEMSIG_GEODATA)/flatlandia --out benchmarks/real_photographs.json
+	$(BIN)/semsig benchmark flatlandia $(SEMSIG_GEODATA)/flatlandia --methods paper,default,generic,learned --out benchmarks/real_photographs.json
 	$(BIN)/python -m benchmarks.tables
 
 reproduce: $(DEV) ## the paper's experiments, into reproduction/: report and figures, a quarter of an hour

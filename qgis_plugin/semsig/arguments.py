@@ -55,7 +55,7 @@ METHOD_HELP = (
     "occurs, in any order. jaccard+jaccard: by which types and which angles occur at all. "
     "types:edit and angles:edit: as edit+edit, by only the types or only the angles."
 )
-NOISES = ("generic", "light", "medium", "strong", "by-hand")
+NOISES = ("generic", "light", "medium", "strong", "by-hand", "photo", "panorama")
 DISTORTIONS = ("none", "light", "medium", "strong")
 
 Value = Union[str, float, bool, None, "list[str]"]

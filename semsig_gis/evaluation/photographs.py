@@ -13,7 +13,7 @@ import pandas as pd
 from semsig_gis.core import GridSpec, InputError, SignatureSpec, angular_distance, to_degrees
 from semsig_gis.database import ObjectStore, build_database, open_city, save_with_store
 from semsig_gis.evaluation.figures import calibration_bins, range_labels
-from semsig_gis.localization import DEFAULT_RULE, LikelihoodLocator, Location, explain
+from semsig_gis.localization import DEFAULT_RULE, LikelihoodLocator, Location, UsualLocator, explain
 from semsig_gis.objects import assemble, choose_layers, read_files
 from semsig_gis.observation import RADIUS_M, parse_view
 from semsig_gis.sources import load_catalog
@@ -219,7 +219,7 @@ def score_photographs(
     rows, warm = [], set()
     for count, (method, name, photograph) in enumerate(tasks, start=1):
         locator = locators[method]
-        if photograph.north_known or isinstance(locator, LikelihoodLocator):
+        if photograph.north_known or isinstance(locator, LikelihoodLocator | UsualLocator):
             if method not in warm:  # kernels are loaded once
                 locator.locate(photograph.view)
                 warm.add(method)

@@ -139,7 +139,7 @@ def test_failures_have_the_scenes_of_both_places(folder: Path, run_ok: RunOk) ->
         ("benchmark flatlandia nowhere", ["nowhere has no file flatlandia.toml"]),
         ("benchmark flatlandia . --out result.txt", ["the name must end in .json"]),
         ("benchmark flatlandia . --noise n.toml --out objects.csv", ["must end in .json"]),
-        ("benchmark flatlandia . --noise none.toml --limit 1", ["none.toml"]),
+        ("benchmark flatlandia . --noise none.toml --methods learned --limit 1", ["none.toml"]),
     ],
 )
 def test_unusable_input_is_refused(folder: Path, run: Run, line: str, words: list[str]) -> None:

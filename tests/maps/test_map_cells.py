@@ -174,8 +174,8 @@ def test_ambiguity_map_shows_chances_of_queries(page: MapPage) -> None:
 def whole_percent(chance: float) -> str:
     percent = round(chance * 100)
     if percent < 1:
-        return "below 1 %"
-    return "above 99 %" if percent > 99 else f"{percent} %"
+        return "under 1 %"
+    return "over 99 %" if percent > 99 else f"{percent} %"
 
 
 def test_identifiability_map_describes_cells_and_goes_to_lookalikes(page: MapPage) -> None:

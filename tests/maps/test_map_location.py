@@ -144,7 +144,7 @@ def test_explanation_shows_sectors_of_photos(page: MapPage) -> None:
 def test_withheld_answer_shows_all_candidates(page: MapPage) -> None:
     query = Signature(CODES[:1], None)
     index = build_index(CITY, named_noise("strong"))
-    location = locate(index, query, top=7)
+    location = locate(index, query, top=7, surely_here=True)
     assert not location.answer.given
     page.open(location_map(location))
     legend = page.text(LEGEND)

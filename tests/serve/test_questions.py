@@ -18,6 +18,7 @@ from pyproj import Transformer
 from workbench import coco, decompression_bomb, picture
 
 from semsig_gis.database import visible_objects_at
+from semsig_gis.localization import NOISES
 from semsig_gis.observation import Camera
 from semsig_gis.serve import Question, Workbench, city_streets
 
@@ -74,7 +75,7 @@ def test_city_request_returns_facts_about_the_city(page: Page) -> None:
     city, database = page.ask("/api/city"), page.bench.database
     assert (city["name"], city["cells"], city["radius"]) == ("town", len(database), 30.0)
     assert city["noise"][0] == "by-hand"
-    assert set(city["noise"]) == {"by-hand", "generic", "light", "medium", "strong"}
+    assert set(city["noise"]) == set(NOISES)
     assert any(line.startswith("Town") for line in city["licences"])
     assert city["image"]["url"].startswith("data:image/png;base64,")
     codes = [item["code"] for item in city["classes"]]

@@ -35,6 +35,13 @@ PRIOR = 0.5
 """Chance that a view is from elsewhere before its objects are compared."""
 MEAN_OBJECTS = 10.0
 CLUMPING = 4.0
+LOG_SECTORS = 2.0
+"""Logarithm by which a view of sectors is likelier from the area than `PRIOR` says.
+
+Photographs have too few objects to decide between the area and elsewhere. With it, photographs of
+eight places of the Flatlandia data set that were asked of the other places were answered in 1 %,
+and the answers to photographs of the area fell from 20 % to 18 %.
+"""
 LOG_PRIOR = math.log(PRIOR)
 SIMULATED = 1000
 """Simulated views of a goodness of fit."""
@@ -63,7 +70,9 @@ def evidence_ratio(
     """
     if not any(map(len, views)):
         return 0.0
-    return log_evidence - sum(background_loglik(index, view) for view in views)
+    sectors = any(photo.sectors for view in views for photo in View.of(view).photos)
+    background = sum(background_loglik(index, view) for view in views)
+    return log_evidence - background + (LOG_SECTORS if sectors else 0.0)
 
 
 def background_loglik(index: LikelihoodIndex, query: Signature) -> float:

@@ -193,6 +193,7 @@ class NoiseMixture(Displayed):
 
     Examples
     --------
+    >>> from semsig_gis import named_noise
     >>> [spec.name for spec in named_noise("generic").specs]
     ['light', 'medium', 'strong']
     """

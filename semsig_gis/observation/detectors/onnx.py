@@ -271,7 +271,11 @@ def _class_names(
         return (model_names,)
     if names != "coco" and not Path(names).is_file():
         raise InputError(f"{names} is not a file; give 'coco' or a file of class names.")
-    choices = COCO_NAMES if names == "coco" else (read_class_names(Path(names)),)
+    if names == "coco":
+        choices = COCO_NAMES
+    else:
+        lines = read_class_names(Path(names)).items()
+        choices = ({number: name for number, name in lines if name},)
     if model_names is not None and all(max(model_names) != max(choice) for choice in choices):
         raise InputError(
             f"{model} has {len(model_names)} classes, and {names} has {len(choices[0])}; give the "

@@ -108,7 +108,7 @@ def read_class_names(source: Path) -> dict[int, str]:
     text = text_of(source)
     suffix = source.suffix.lower()
     if suffix not in {".yaml", ".yml", ".json"}:
-        return dict(enumerate(text.rstrip().split("\n")))
+        return dict(enumerate(text.split("\n")))
     try:
         return numbered_names(parse_json(text) if suffix == ".json" else yaml.safe_load(text))
     except (yaml.YAMLError, RecursionError, *INVALID) as error:
