@@ -271,9 +271,8 @@ def _class_names(
         return (model_names,)
     if names != "coco" and not Path(names).is_file():
         raise InputError(f"{names} is not a file; give 'coco' or a file of class names.")
-    if names == "coco":
-        choices = COCO_NAMES
-    else:
+    choices: tuple[dict[int, str], ...] = COCO_NAMES
+    if names != "coco":
         lines = read_class_names(Path(names)).items()
         choices = ({number: name for number, name in lines if name},)
     if model_names is not None and all(max(model_names) != max(choice) for choice in choices):
