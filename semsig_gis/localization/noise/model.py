@@ -134,6 +134,11 @@ class NoiseSpec(Displayed):
             _check_shares(f"confusion row {name!r}", _table(f"confusion row {name!r}", row))
         for name, points in _table("fading", self.fading).items():
             _check_fading(name, points)
+        fading = {
+            name: tuple((float(metres), float(share)) for metres, share in points)
+            for name, points in self.fading.items()
+        }
+        object.__setattr__(self, "fading", fading)
         if _table("clutter_shares", self.clutter_shares):
             _check_shares("clutter_shares", self.clutter_shares)
 
