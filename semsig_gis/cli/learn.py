@@ -46,26 +46,17 @@ if TYPE_CHECKING:
     from semsig_gis.database import City, SignatureDatabase
     from semsig_gis.localization import NoiseEstimate, Sample
 
-Samples = Annotated[
-    Path,
-    typer.Option(
-        help="Detections of known places: a CSV or JSON lines file of views with x and y "
-        "(metres) or cell_id (its centre)."
-    ),
-]
+SAMPLES = typer.Option(
+    help="Detections of known places: a CSV or JSON lines file of views with x and y (metres) or "
+    "cell_id (its centre)."
+)
 
 
 @app.command()
 def learn(
     database: Database,
     *,
-    samples: Annotated[
-        Path | None,
-        typer.Option(
-            help="Detections of known places: a CSV or JSON lines file of views with x and y "
-            "(metres) or cell_id (its centre)."
-        ),
-    ] = None,
+    samples: Annotated[Path | None, SAMPLES] = None,
     unlabelled: Annotated[
         Path | None,
         typer.Option(
@@ -261,7 +252,7 @@ def _rate(row: dict[Hashable, Any]) -> list[str]:
 def calibrate(
     database: Database,
     *,
-    samples: Samples,
+    samples: Annotated[Path, SAMPLES],
     out: Annotated[Path, typer.Option(help="Rule to write (.json), for --rule.")],
     precision: Annotated[
         float,

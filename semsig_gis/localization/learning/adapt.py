@@ -144,18 +144,13 @@ is too few to adapt a noise model to; give at least 20.
             f"to adapt a noise model to; give at least {FEWEST_VIEWS}."
         )
     search = _Search(database=database, store=store, north_sigma=north_sigma)
-    halves = np.arange(len(photos)) % 2 == 0
     before, places = search.places(photos, noise)
-    half = [row for row, first in enumerate(halves) if first]
-    trial = search.fitted([photos[row] for row in half], [places[row] for row in half], noise, name)
-    rest = np.flatnonzero(~halves)
-    after, _ = search.places([photos[row] for row in rest], trial)
-    gains = after - before[rest]
+    trial = search.fitted(photos[::2], places[::2], noise, name)
+    after, _ = search.places(photos[1::2], trial)
+    gains = after - before[1::2]
     gain, sigma = float(gains.mean()), float(gains.std() / math.sqrt(len(gains)))
     adapted = gain > sigma
-    result = noise
-    if adapted:
-        result = search.fitted(photos, places, noise, name)
+    result = search.fitted(photos, places, noise, name) if adapted else noise
     return Adaptation(noise=result, adapted=adapted, gain=gain, gain_sigma=sigma, views=len(photos))
 
 
@@ -189,8 +184,7 @@ class _Search:
             ends = np.cumsum(parts.chances)
             shares = (np.arange(PLACES) + 0.5) / PLACES * ends[-1]
             rows = np.searchsorted(ends, shares)
-            evidence = float(np.logaddexp.reduce(scores.loglik) - math.log(len(self.database)))
-            return evidence, (parts.places[rows], parts.headings[rows])
+            return chances.log_evidence, (parts.places[rows], parts.headings[rows])
 
         evidence, places = zip(*each_in_order(find, photos), strict=True)
         return np.array(evidence), list(places)
