@@ -27,10 +27,10 @@ from benchmarks._contents import digest
 from benchmarks._soak_runs import LIMIT_S
 from semsig_gis.database import open_dataset, open_store
 from semsig_gis.evaluation import open_experiment_spec, open_identifiability
-from semsig_gis.exports import read_geopackage
 from semsig_gis.localization import open_noise, open_rule, raster_prior
 from semsig_gis.objects import read_area
 from semsig_gis.observation import read_queries, read_route
+from semsig_gis.output import read_geopackage
 from semsig_gis.sources import reader
 
 if TYPE_CHECKING:

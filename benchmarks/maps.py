@@ -15,8 +15,8 @@ from benchmarks.comparison import Comparison
 from semsig_gis.database import ViewpointSpec, build_database
 from semsig_gis.evaluation import evaluate
 from semsig_gis.localization import Method
-from semsig_gis.maps import ambiguity_map, available, drift_map, evaluation_map, save_map
 from semsig_gis.objects import StreetObjects
+from semsig_gis.output import ambiguity_map, available, drift_map, evaluation_map, save_map
 from semsig_gis.sources import PARIS_LIKE, CitySpec, synthetic_surroundings
 
 if TYPE_CHECKING:

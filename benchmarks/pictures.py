@@ -25,7 +25,8 @@ from benchmarks.workbench import answer_times, photo_in, serving
 from semsig_gis.database import ObjectStore, build_database, open_city, save_with_store
 from semsig_gis.evaluation import evaluate, identify
 from semsig_gis.localization import Method, build_index, cell_noise, localize, locate, named_noise
-from semsig_gis.maps import (
+from semsig_gis.objects import StreetObjects
+from semsig_gis.output import (
     ambiguity_map,
     available,
     city_map,
@@ -37,7 +38,6 @@ from semsig_gis.maps import (
     objects_map,
     save_map,
 )
-from semsig_gis.objects import StreetObjects
 from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:

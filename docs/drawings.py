@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import semsig_gis as sg
-from semsig_gis.reports import COLOURS, Scene, SceneObject, blank_figure, draw_scenes, saved
+from semsig_gis.output import COLOURS, Scene, SceneObject, blank_figure, draw_scenes, saved
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from semsig_gis.reports import Picture
+    from semsig_gis.output import Picture
 
 RESULTS = Path(__file__).resolve().parents[1] / "benchmarks"
 FOUND, RECALL = "P(error ≤ 50 m)", "recall@10 %"

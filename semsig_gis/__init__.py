@@ -49,13 +49,11 @@ _MOVED = {
             "open_experiment_spec open_identifiability open_results run_experiments "
             "save_identifiability"
         ),
-        "maps": (
+        "output": (
             "ambiguity_map drift_map ground_map identifiability_map localization_map "
-            "objects_map posterior_map show_map"
-        ),
-        "exports": "GeopackageContents export_geotiff export_item read_geopackage",
-        "reports": (
-            "plot_answer plot_database plot_evaluation plot_identifiability plot_objects write_page"
+            "objects_map posterior_map show_map "
+            "GeopackageContents export_geotiff export_item read_geopackage plot_answer "
+            "plot_database plot_evaluation plot_identifiability plot_objects write_page"
         ),
     }.items()
     for name in names.split()

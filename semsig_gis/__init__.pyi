@@ -93,17 +93,17 @@ from .evaluation import (
     run_experiment as run_experiment,
     save_evaluation as save_evaluation,
 )
-from .maps import (
+from .output import (
     city_map as city_map,
     evaluation_map as evaluation_map,
     location_map as location_map,
     save_map as save_map,
 )
-from .exports import (
+from .output import (
     export_answer as export_answer,
     export_database as export_database,
 )
-from .reports import (
+from .output import (
     Curve as Curve,
     Plot as Plot,
     cell_scene as cell_scene,

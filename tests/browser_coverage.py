@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 SCRIPTS = {
     f"{folder}{file.name}": file.read_text(encoding="utf-8")
-    for package, folder in (("maps", ""), ("serve", "serve/"))
+    for package, folder in (("output.html", ""), ("serve", "serve/"))
     for file in resources.files(f"semsig_gis.{package}").joinpath("js").iterdir()
     if file.name.endswith(".js")
 }
-# The name that `maps.parts.page_element` and `serve.page` give the script in a page.
+# The name that `output.html.page_elements.page_element` and `serve.page` give the script in a page.
 FOLDER = "semsig/"
 MOST_LISTED = 20  # lines that no test ran
 

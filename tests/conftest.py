@@ -197,7 +197,7 @@ def snapshot(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
 @pytest.fixture
 def map_files() -> None:
     """Require the map files of a package that was built with npm."""
-    from semsig_gis.maps import page
+    from semsig_gis.output.html import page
 
     if not page.available():
         unavailable("browser", "the package was built without npm, so it carries no map files")

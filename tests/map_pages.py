@@ -21,7 +21,7 @@ from small_city import chances_of
 from semsig_gis.core import Taxonomy
 from semsig_gis.database import ObjectStore, build_database
 from semsig_gis.localization import Method, build_index, localize, locate
-from semsig_gis.maps import (
+from semsig_gis.output import (
     ambiguity_map,
     drift_map,
     evaluation_map,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from map_pages import HOSTILE, hostile_taxonomy
 
-from semsig_gis.reports import (
+from semsig_gis.output import (
     Curve,
     Number,
     OutcomeMap,

@@ -218,7 +218,7 @@ def update(
     if as_json:
         print_json(report.to_dict() | ({} if years is None else {"years": years}))
         return
-    from semsig_gis.reports import update_tables
+    from semsig_gis.output import update_tables
 
     print_tables(update_tables(report))
 
@@ -260,7 +260,7 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
         print_json(_info(database))
         return
     from semsig_gis.database import companions, open_city
-    from semsig_gis.reports import database_tables, identifiability_tables
+    from semsig_gis.output import database_tables, identifiability_tables
 
     city = open_city(database)
     counts = city.object_counts

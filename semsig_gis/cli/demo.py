@@ -34,10 +34,14 @@ def demo(
     from semsig_gis.database import build_database, save_database
     from semsig_gis.evaluation import evaluate as run
     from semsig_gis.evaluation import save_evaluation
-    from semsig_gis.exports import export_database
-    from semsig_gis.maps import evaluation_map, objects_map, save_map
     from semsig_gis.objects import build_objects, save_objects
-    from semsig_gis.reports import evaluation_tables
+    from semsig_gis.output import (
+        evaluation_map,
+        evaluation_tables,
+        export_database,
+        objects_map,
+        save_map,
+    )
     from semsig_gis.sources import CitySpec, paper_taxonomy, synthetic_city
 
     layers = synthetic_city(CitySpec(seed=seed))

@@ -125,10 +125,10 @@ def evaluate(
     )
     from semsig_gis.evaluation import evaluate as run
     from semsig_gis.localization import Method, build_index
-    from semsig_gis.reports import evaluation_headline, evaluation_tables
+    from semsig_gis.output import evaluation_headline, evaluation_tables
 
     if report is not None:  # if matplotlib is missing, fail before the work instead of after it
-        from semsig_gis.reports import evaluation_page, write_page
+        from semsig_gis.output import evaluation_page, write_page
     chain = [
         dataclasses.replace(
             step,
@@ -229,7 +229,7 @@ def compare(first: Result, second: Result, *, as_json: AsJson = False) -> None:
         open_results,
         plain_records,
     )
-    from semsig_gis.reports import comparison_sentence, comparison_table
+    from semsig_gis.output import comparison_sentence, comparison_table
 
     pairs = common_cases(open_results(first), open_results(second))
     tables = {name: compare_evaluations(*pair) for name, pair in pairs.items()}
@@ -280,7 +280,7 @@ def reproduce(
     import contextlib
 
     from semsig_gis.evaluation import reproduce as run
-    from semsig_gis.reports import reproduction_report, write_report
+    from semsig_gis.output import reproduction_report, write_report
 
     if workers is None:
         workers = (os.cpu_count() or 1) if size == "full" else 0
@@ -385,7 +385,7 @@ def identify(
     from semsig_gis.evaluation import check_identifiability, save_identifiability
     from semsig_gis.evaluation import identify as run
     from semsig_gis.localization import build_index, cell_noise
-    from semsig_gis.reports import check_tables, identifiability_page, identifiability_tables
+    from semsig_gis.output import check_tables, identifiability_page, identifiability_tables
 
     _require_check(check, out)
     city = open_city(database)
@@ -417,7 +417,7 @@ def identify(
                 columns, index, queries=check, threads=workers, progress=advance
             )
     if out is not None and verification is not None:
-        from semsig_gis.reports import write_report  # imports matplotlib
+        from semsig_gis.output import write_report  # imports matplotlib
 
         page = identifiability_page(
             columns,
@@ -445,4 +445,4 @@ def _require_check(check: int | None, out: Path | None) -> None:
         return
     if check is None:
         raise InputError("--out was given without --check; give both or neither.")
-    from semsig_gis.reports import draw_plot  # noqa: F401 - matplotlib may be missing
+    from semsig_gis.output import draw_plot  # noqa: F401 - matplotlib may be missing

@@ -67,8 +67,8 @@ def export(
 ) -> None:
     """Export cells, objects and queries for QGIS and other programs."""
     from semsig_gis.database import open_city
-    from semsig_gis.exports import ITEM, export_database, export_item
     from semsig_gis.objects import open_objects
+    from semsig_gis.output import ITEM, export_database, export_item
 
     keep_inputs(out, read=(database, objects))
     if out.suffix.lower() == ITEM:
@@ -115,8 +115,8 @@ def import_(
     """Restore a database from an exported GeoPackage."""
     from semsig_gis.database import save_database
     from semsig_gis.evaluation import save_identifiability
-    from semsig_gis.exports import read_geopackage
     from semsig_gis.objects import save_objects
+    from semsig_gis.output import read_geopackage
 
     keep_inputs(out, objects, read=(geopackage,))
     require_suffix(".parquet", out, objects)

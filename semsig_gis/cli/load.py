@@ -296,7 +296,7 @@ def _save_loaded(
     if as_json:
         print_json(report.to_dict())
     else:
-        from semsig_gis.reports import quality_tables
+        from semsig_gis.output import quality_tables
 
         # The notes are printed below the tables only.
         print_tables(quality_tables(replace(report, notes=())))

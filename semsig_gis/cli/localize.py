@@ -408,7 +408,7 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
     with progress("answering"):
         answer = locator.locate(query)
     if options.map_ is not None:
-        from semsig_gis.maps import localization_map, location_map, save_map
+        from semsig_gis.output import localization_map, location_map, save_map
 
         with progress("drawing the map"):
             if options.ranking == LIKELIHOOD:
@@ -444,8 +444,8 @@ def _write(
     options: LocalizeOptions, out: Path, city: City, answer: Answer, locator: Locator[Answer]
 ) -> dict[str, Any]:
     """Write the regions to search, or all chances; return the totals of the regions."""
-    from semsig_gis.exports import export_answer
     from semsig_gis.localization import REGION_SHARE
+    from semsig_gis.output import export_answer
 
     if answer.tied_beyond:
         # Cells that tie with the last candidate are searched as well.

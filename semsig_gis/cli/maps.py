@@ -36,8 +36,8 @@ def draw_ground(
     map_: folium.Map, city: City, *, buildings: Path | None = None, streets: Path | None = None
 ) -> None:
     """Add streets and buildings to a map, from files or else from the object store."""
-    from semsig_gis.maps import ground_map
     from semsig_gis.objects import read_surroundings
+    from semsig_gis.output import ground_map
 
     crs = city.database.crs
     houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)
@@ -124,8 +124,8 @@ def map_(
     from semsig_gis.database import open_city, require_same_place
     from semsig_gis.evaluation import open_evaluation
     from semsig_gis.localization import open_posterior
-    from semsig_gis.maps import RASTERS, city_map, save_map
     from semsig_gis.objects import open_objects
+    from semsig_gis.output import RASTER_SUFFIXES, city_map, save_map
 
     paths = (evaluation, drift, location, objects)
     if not (identifiability or ambiguity or any(path is not None for path in paths)):
@@ -152,7 +152,7 @@ def map_(
     dates = {} if newer is None else _dates(city, newer)
     answer: dict[str, Any] = {}
     if location is not None:
-        raster = location.suffix.lower() in RASTERS
+        raster = location.suffix.lower() in RASTER_SUFFIXES
         answer = {"posterior": open_posterior(location, opened)} if raster else {"answer": location}
     if street_objects is not None:
         places = shapely.get_coordinates(street_objects.table.geometry.to_crs(opened.crs).array)

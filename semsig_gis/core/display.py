@@ -18,7 +18,7 @@ LONGEST_FACT = 60  # letters
 
 # Names for type hints: these classes belong to packages that core does not import.
 Axes = Any  # matplotlib.axes.Axes
-MapFrame = Any  # semsig_gis.maps.page.MapFrame
+MapFrame = Any  # semsig_gis.output.html.page.MapFrame
 
 
 class Displayed(ABC):

@@ -9,14 +9,14 @@ import numpy as np
 
 from semsig_gis.core import CHANCES, percent
 from semsig_gis.localization import UNKNOWN_NAME
-from semsig_gis.maps import REGION_COLOURS, data_url, exact_latlon, region_levels, to_metres
+from semsig_gis.output import REGION_COLOURS, data_url, exact_latlon, region_levels, to_metres
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization import Explanation, Location, NoiseTable
-    from semsig_gis.maps import CellPixels
+    from semsig_gis.output import CellPixels
     from semsig_gis.serve.question import MarkNumber, Question
 
 LEAST_SHARE = 1e-6  # lower bound of shares and odds before the logarithm

@@ -6,7 +6,7 @@ import html
 import re
 from importlib import resources
 
-from semsig_gis.maps import asset_text
+from semsig_gis.output import asset_text
 
 _SCRIPT = re.compile(r'<script src="(?P<name>[^"]+)"></script>')
 _STYLE = re.compile(r'<link rel="stylesheet" href="(?P<name>[^"]+)">')
@@ -52,5 +52,5 @@ def _text(name: str) -> str:
     if name in LEAFLET_FILES:
         return asset_text(name)
     folder, _, file = name.rpartition("/")
-    package = "semsig_gis.maps" if folder == "maps" else "semsig_gis.serve"
+    package = "semsig_gis.output.html" if folder == "maps" else "semsig_gis.serve"
     return resources.files(package).joinpath("js", file).read_text(encoding="utf-8")

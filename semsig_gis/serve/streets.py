@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import EmptyResultError
-from semsig_gis.maps import packed_ground, search_area
+from semsig_gis.output import packed_ground, search_area
 
 if TYPE_CHECKING:
     from semsig_gis.database import ObjectStore, SignatureDatabase

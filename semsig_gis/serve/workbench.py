@@ -27,7 +27,6 @@ from semsig_gis.core import (
 )
 from semsig_gis.database import visible_objects_at
 from semsig_gis.evaluation import CitySights, Sight, SimulatedDetector, prepare_chain
-from semsig_gis.exports import export_answer
 from semsig_gis.localization import (
     NOISES,
     IncrementalIndex,
@@ -38,18 +37,6 @@ from semsig_gis.localization import (
     next_questions,
     position_prior,
     with_unplaced,
-)
-from semsig_gis.maps import (
-    MAX_ZOOM,
-    OUTLINES,
-    RAYS,
-    CellPixels,
-    city_image,
-    corners_of,
-    data_url,
-    exact_latlon,
-    panel_signs,
-    to_metres,
 )
 from semsig_gis.observation import (
     LabelMap,
@@ -62,6 +49,19 @@ from semsig_gis.observation import (
     picture_shot,
     read_pictures,
     with_heights,
+)
+from semsig_gis.output import (
+    MAX_ZOOM,
+    OUTLINES,
+    RAYS,
+    CellPixels,
+    city_image,
+    corners_of,
+    data_url,
+    exact_latlon,
+    export_answer,
+    panel_signs,
+    to_metres,
 )
 from semsig_gis.serve.drawing import answer_drawing, class_shares
 from semsig_gis.serve.question import Question, camera_of, latlon, number

@@ -20,10 +20,10 @@ from small_city import chances_of, small_city, small_evaluation
 from semsig_gis.cli.localize import print_localization
 from semsig_gis.database import ObjectStore, open_database, save_database, save_with_store
 from semsig_gis.evaluation import save_evaluation, save_identifiability
-from semsig_gis.exports import cell_errors
 from semsig_gis.localization import Localization, localize
 from semsig_gis.objects import open_objects, save_objects
 from semsig_gis.observation import parse_view
+from semsig_gis.output import cell_errors
 
 if TYPE_CHECKING:
     from conftest import Run, RunOk

@@ -40,9 +40,16 @@ from semsig_gis.core import (
     class_signs,
     group_labels,
 )
-from semsig_gis.exports import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
-from semsig_gis.maps import OUTLINES, mark_svg
-from semsig_gis.reports import MARKERS, axes, plots, scenes
+from semsig_gis.output import (
+    AMBIGUITY,
+    CLASS_MARKERS,
+    IDENTIFIABILITY,
+    MARKERS,
+    OUTLINES,
+    by_outcome,
+    mark_svg,
+)
+from semsig_gis.output.figures import axes, plots, scenes
 
 SIGHTS = {
     "normal": None,
@@ -89,7 +96,7 @@ def distances(ones: np.ndarray, others: np.ndarray, sight: str) -> np.ndarray:
 
 
 def script(name: str) -> str:
-    return resources.files("semsig_gis.maps").joinpath("js", name).read_text(encoding="utf-8")
+    return resources.files("semsig_gis.output.html").joinpath("js", name).read_text("utf-8")
 
 
 (POINTED,) = re.findall(r'highlight: "(#\w{6})"', script("layers.js"))

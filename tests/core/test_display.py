@@ -36,11 +36,9 @@ from semsig_gis import (
 from semsig_gis.core import Displayed
 from semsig_gis.database import PartitionedDatabase, update_database
 from semsig_gis.evaluation import error_field
-from semsig_gis.exports import GeopackageContents
 from semsig_gis.localization import LikelihoodIndex, named_drift, search_regions
-from semsig_gis.maps import show_map
 from semsig_gis.objects import assemble
-from semsig_gis.reports import Scene
+from semsig_gis.output import GeopackageContents, Scene, show_map
 from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:

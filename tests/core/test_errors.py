@@ -52,7 +52,7 @@ def test_nearest_name_is_one_of_the_names(name: str, names: list[str]) -> None:
     ("name", "package", "use"),
     [
         ("cluster", "distributed", "list(parallel.run_tasks(abs, [1], workers=2))"),
-        ("plot", "matplotlib", "import semsig_gis.reports.axes"),
+        ("plot", "matplotlib", "import semsig_gis.output.figures.axes"),
         ("raster", "rasterio", "import semsig_gis.storage.raster"),
     ],
 )

@@ -41,7 +41,7 @@ from semsig_gis.localization import (
     parse_method,
     score_cells,
 )
-from semsig_gis.reports import evaluation_tables
+from semsig_gis.output import evaluation_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -24,7 +24,7 @@ from semsig_gis.objects import (
     read_small_layers,
     save_objects,
 )
-from semsig_gis.reports import quality_tables
+from semsig_gis.output import quality_tables
 from semsig_gis.sources import (
     ClassBy,
     LayerSpec,

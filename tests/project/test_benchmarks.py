@@ -20,8 +20,8 @@ from view_oracle import cell_loglik, random_view
 from benchmarks import bayes, chances, history, stranger, tables, views
 from benchmarks._measuring import FOLDER, INPUTS, LAST_ONLY, read_rows
 from benchmarks.views import NOISE
-from semsig_gis.maps import page
 from semsig_gis.observation import Photo, View
+from semsig_gis.output.html import page
 
 MEASURES = ("edit", "jaccard", "histogram")
 SINGLES = {

@@ -15,8 +15,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pytest
 
-from semsig_gis.maps import MapFrame
-from semsig_gis.reports import Picture
+from semsig_gis.output import MapFrame, Picture
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

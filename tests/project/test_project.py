@@ -21,7 +21,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import semsig_gis
-from semsig_gis.maps import page
+from semsig_gis.output.html import page
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "semsig_gis"
@@ -94,7 +94,7 @@ def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
     data = {f"semsig_gis/{path.relative_to(ROOT)}" for path in files}
     suffixes = {".css", ".html", ".js", ".py", ".qgs", ".qml", ".xml"}
     code = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*") if path.suffix in suffixes}
-    others = {"py.typed", "assets/manifest.toml", "exports/shown.toml"}
+    others = {"py.typed", "assets/manifest.toml", "output/qgis/shown.toml"}
     assert data | code | {f"semsig_gis/{name}" for name in others} <= wheel.keys()
     if page.available():
         assert {f"semsig_gis/assets/{name}" for name in page.assets()} <= wheel.keys()

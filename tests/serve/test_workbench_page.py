@@ -19,7 +19,7 @@ from workbench_pages import STAGE, WorkbenchPage
 
 from benchmarks.street_photos import street_photo
 from semsig_gis.evaluation import Sight
-from semsig_gis.maps import to_latlon
+from semsig_gis.output import to_latlon
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

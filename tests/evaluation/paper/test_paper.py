@@ -14,7 +14,7 @@ from semsig_gis.database import open_database, save_database
 from semsig_gis.evaluation import paper_experiments, reproduce, time_queries
 from semsig_gis.evaluation import published as paris
 from semsig_gis.localization import Method, score_cells
-from semsig_gis.reports import reproduction_report
+from semsig_gis.output import reproduction_report
 from semsig_gis.sources import CitySpec, paper_taxonomy
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.evaluation import Reproduction
-    from semsig_gis.reports import Number, Report
+    from semsig_gis.output import Number, Report
 
 
 def test_all_experiments_of_the_paper_are_specified(snapshot: Callable[[str, str], None]) -> None:

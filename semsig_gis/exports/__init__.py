@@ -1,5 +1,0 @@
-"""Files for other programs: GeoPackage, GeoParquet, GeoJSON, CSV, tiles, rasters, KML and STAC."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,1 @@
+"""Results as layers: a table with a geometry, columns and styles."""

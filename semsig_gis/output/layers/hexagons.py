@@ -1,0 +1,118 @@
+"""Statistics of cells by area, and the layer of H3 hexagons with them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import h3
+import numpy as np
+import shapely
+from pyproj import Transformer
+
+from semsig_gis.core import InputError
+from semsig_gis.database import database_specs
+from semsig_gis.output.layers.layers import group_means, table_layer
+from semsig_gis.output.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation, Identifiability
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.output.layers.layers import Layer
+
+
+FINEST = 15
+
+
+def hexagons_layer(
+    database: SignatureDatabase,
+    resolution: int,
+    *,
+    objects: StreetObjects | None = None,
+    identifiability: Identifiability | None = None,
+    evaluation: Evaluation | None = None,
+) -> Layer:
+    """Return the layer of H3 hexagons that contain a cell, object or query, in the database's CRS.
+
+    ``h3`` is the index. In addition to the columns of `area_statistics`, ``objects`` is the number
+    of street objects, ``queries`` the number of queries and ``found`` their share of successes.
+    """
+    if not 0 <= resolution <= FINEST:
+        raise InputError(
+            f"resolution {resolution} was given for hexagons; give 0 to {FINEST} (finest)."
+        )
+    to_degrees = Transformer.from_crs(database.crs, "EPSG:4326")
+
+    def hexagon_ids(xy: NDArray[np.float64]) -> NDArray[np.uint64]:
+        places = zip(*(axis.tolist() for axis in to_degrees.transform(*xy.T)), strict=True)
+        ids = (h3.str_to_int(h3.latlng_to_cell(*place, resolution)) for place in places)
+        return np.fromiter(ids, np.uint64, len(xy))
+
+    # Number the hexagons of all places, then split the numbers by cells, objects and queries.
+    places = [database.xy]
+    places += [] if objects is None else [objects.xy]
+    if evaluation is not None:
+        places.append(np.asarray(shapely.get_coordinates(evaluation.queries.geometry.array)))
+    ids, numbers = np.unique(np.concatenate([*map(hexagon_ids, places)]), return_inverse=True)
+    of_cells, *others = np.split(numbers, np.cumsum([len(xy) for xy in places])[:-1])
+    names = [*map(h3.int_to_str, ids.tolist())]
+    columns: dict[str, Any] = {"h3": names}
+    columns |= area_statistics(database, of_cells, len(ids), identifiability=identifiability)
+    styles = [("Ambiguity", "type_group_size", AMBIGUITY)]
+    if identifiability is not None:
+        styles.insert(0, ("Identifiability", "chance_found", IDENTIFIABILITY))
+    if objects is not None:
+        columns["objects"] = np.bincount(others.pop(0), minlength=len(ids))
+    if evaluation is not None:
+        (of_queries,) = others
+        columns["queries"] = np.bincount(of_queries, minlength=len(ids))
+        columns["found"] = group_means(of_queries, evaluation.successful, len(ids))
+        styles.insert(0, ("Queries found", "found", IDENTIFIABILITY))
+    # The corners of all hexagons are projected together.
+    rings = [h3.cell_to_boundary(name) for name in names]
+    latitudes, longitudes = np.concatenate([np.asarray(ring) for ring in rings]).T
+    xy = np.stack(to_degrees.transform(latitudes, longitudes, direction="INVERSE"), axis=1)
+    hexagon_numbers = np.repeat(np.arange(len(rings)), [*map(len, rings)])
+    shapes = shapely.polygons(shapely.linearrings(xy, indices=hexagon_numbers))
+    return table_layer(
+        gpd.GeoDataFrame(columns, geometry=shapes, crs=database.crs),
+        name="hexagons",
+        title="Hexagons",
+        description=f"The cells in each hexagon of H3 of resolution {resolution}, together.",
+        geometry="polygon",
+        licenses=database.licenses,
+        facts={**database_specs(database), "h3_resolution": resolution},
+        styles=tuple(by_amount(*style, geometry="polygon", size=0.0) for style in styles),
+    )
+
+
+def area_statistics(
+    database: SignatureDatabase,
+    areas: NDArray[np.int64],
+    count: int,
+    *,
+    identifiability: Identifiability | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Return statistics of the cells in each area; `areas` has the area number of each cell.
+
+    ``cells`` is their number, ``mean_length`` the mean number of objects that they see,
+    ``ambiguous`` the share of cells with the types of another cell, ``type_group_size`` the median,
+    and ``chance_found`` the mean chance to be found. NaN in an area without cells.
+    """
+    cells, sizes = np.bincount(areas, minlength=count), database.type_group_sizes
+    # Lower median: the middle row of each area, with the rows sorted by area and size.
+    ordered = sizes[np.lexsort((sizes, areas))]
+    middles = np.cumsum(cells) - cells + (cells - 1) // 2
+    medians = np.where(cells > 0, ordered[np.minimum(middles, len(ordered) - 1)], np.nan)
+    columns = {
+        "cells": cells,
+        "mean_length": group_means(areas, database.lengths, count),
+        "ambiguous": group_means(areas, sizes > 1, count),
+        "type_group_size": medians,
+    }
+    if identifiability is not None:
+        columns["chance_found"] = group_means(areas, identifiability.found, count)
+    return columns

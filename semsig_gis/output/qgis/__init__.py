@@ -1,0 +1,1 @@
+"""GeoPackages and rasters with their styles, and QGIS projects."""

@@ -1,0 +1,187 @@
+"""Tables of a quality report and of an update."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING
+
+from semsig_gis.core import Table, percent
+from semsig_gis.objects import SQUARE_M
+from semsig_gis.output.tables.tables import brief_notes, distortion_rows, note_tables
+from semsig_gis.sources import RowCounts
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from semsig_gis.database import UpdateReport
+    from semsig_gis.objects import QualityReport
+
+
+ROW_COUNTS = tuple(field.name for field in fields(RowCounts))
+NOTES_SHOWN = 4  # per layer; one with many unreadable rows would have too many
+# Tables that are omitted when they have no rows.
+MAY_BE_EMPTY = frozenset({"Conflated", "Layers not read"})
+
+
+def quality_tables(report: QualityReport) -> tuple[Table, ...]:
+    """Return the tables of a quality report: classes, layers, conflation, place and licences.
+
+    Parameters
+    ----------
+    report : QualityReport
+        Result of `quality_report`.
+
+    Returns
+    -------
+    tuple of Table
+        Four tables; if there are any, also a table of layers that were not read, of conflated
+        objects and of notes.
+
+    Examples
+    --------
+    >>> from semsig_gis import (
+    ...     CitySpec, build_objects, paper_taxonomy, quality_report, synthetic_city
+    ... )
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, load = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> [table.title for table in quality_tables(quality_report(objects, load))]
+    ['Objects by class', 'Rows by layer', 'Place', 'Licences']
+    """
+    sides = "west, south, east, north"
+    tables = (
+        _class_table(report),
+        _layer_table(report),
+        Table(
+            "Layers not read",
+            ("layer", "class", "objects"),
+            tuple(
+                (
+                    item.name,
+                    ", ".join(item.classes),
+                    "not counted" if item.objects is None else f"{item.objects:,}",
+                )
+                for item in report.unread
+            ),
+            note=(
+                "Add one with --layer +NAME, or all with --all-layers. The counts are rows "
+                "that would be kept, before objects at one place are collapsed."
+            ),
+            labels=2,
+        ),
+        Table(
+            "Conflated",
+            ("class", "from", "into", "objects", "radius, m", "median, m", "largest, m"),
+            tuple(
+                (
+                    *(item.class_name, item.merged, item.kept, f"{item.count:,}"),
+                    *map(_decimal_text, (item.radius, item.median_m, item.largest_m)),
+                )
+                for item in report.conflated
+            ),
+        ),
+        Table(
+            "Place",
+            ("what", "value"),
+            (
+                ("coordinate system", report.crs),
+                (f"{sides}, m", ", ".join(f"{edge:.0f}" for edge in report.extent)),
+                (f"{sides}, degrees", ", ".join(f"{edge:.5f}" for edge in report.extent_degrees)),
+                *distortion_rows(report.distortion.to_dict()),
+            ),
+        ),
+        Table("Licences", ("licence",), tuple((line,) for line in report.licenses)),
+        *note_tables(report.notes),
+    )
+    return tuple(table for table in tables if table.rows or table.title not in MAY_BE_EMPTY)
+
+
+def _class_table(report: QualityReport) -> Table:
+    absent = f" No objects of: {', '.join(report.absent)}." if report.absent else ""
+    return Table(
+        "Objects by class",
+        ("class", "objects", "rows", "per km² of hull", "per km² occupied", "nearest, m"),
+        tuple(
+            (
+                *(item.class_name, f"{item.objects:,}", f"{item.rows:,}"),
+                *map(_decimal_text, (item.per_km2_hull, item.per_km2_occupied, item.nearest_m)),
+            )
+            for item in report.classes
+        ),
+        note=(
+            f"The convex hull of all objects is {report.hull_km2:,.2f} km², ground without objects "
+            f"included; the squares of {SQUARE_M:.0f} m that contain an object are "
+            f"{report.occupied_km2:,.2f} km². Nearest: the median distance to the nearest other "
+            f"object of the class.{absent}"
+        ),
+    )
+
+
+def _layer_table(report: QualityReport) -> Table:
+    counts = [asdict(item.counts) for item in report.sources]
+    # Columns that are 0 in all layers are listed below the table to save width.
+    empty = [name for name in ROW_COUNTS[1:] if not any(count[name] for count in counts)]
+    columns = [name for name in ROW_COUNTS if name not in empty]
+    return Table(
+        "Rows by layer",
+        ("layer", *columns, "kept", "notes"),
+        tuple(
+            (
+                item.name,
+                *(f"{count[name]:,}" for name in columns),
+                *(f"{item.counts.kept:,}", _notes_text(item.notes)),
+            )
+            for item, count in zip(report.sources, counts, strict=True)
+        ),
+        note=f"0 in all layers: {', '.join(empty)}." if empty else "",
+    )
+
+
+def _decimal_text(number: float | None) -> str:
+    return "" if number is None else f"{number:,.1f}"
+
+
+def _notes_text(layer_notes: Sequence[str]) -> str:
+    notes = list(brief_notes(layer_notes))
+    more = len(notes) - NOTES_SHOWN
+    return "; ".join([*notes[:NOTES_SHOWN], *([f"and {more} more (--json)"] if more > 0 else [])])
+
+
+CLASS_COUNTS = ("before", "after", "added", "removed", "moved", "gained", "lost")
+
+
+def update_tables(report: UpdateReport) -> tuple[Table, Table]:
+    """Return the tables of an update: objects by class, and cells."""
+    counts = [[getattr(item, count) for count in CLASS_COUNTS] for item in report.classes]
+    metres = ["" if item.moved_m is None else f"{item.moved_m:,.2f}" for item in report.classes]
+    names = [item.class_name for item in report.classes]
+    totals = [sum(row[column] for row in counts) for column in range(len(CLASS_COUNTS))]
+    layers = f"Layers replaced: {', '.join(report.replaced)}."
+    if report.kept:
+        layers += f" Layers that stay as they were: {', '.join(report.kept)}."
+    cells = {
+        "before": report.cells_before,
+        "after": report.cells,
+        "computed again": report.recomputed,
+        "changed": report.changed,
+        "appeared": report.appeared,
+        "vanished": report.vanished,
+    }
+    return (
+        Table(
+            "Objects by class",
+            ("class", *CLASS_COUNTS, "moved by, m"),
+            tuple(
+                (name, *(f"{number:,}" for number in row), distance)
+                for name, row, distance in zip(
+                    [*names, "all"], [*counts, totals], [*metres, ""], strict=True
+                )
+            ),
+            note=layers,
+        ),
+        Table(
+            "Cells",
+            ("what", "cells"),
+            tuple((name, f"{number:,}") for name, number in cells.items()),
+            note=f"The city has drifted by {percent(report.share, 2)} of its cells.",
+        ),
+    )
