@@ -84,12 +84,12 @@ from .html.page_elements import panel_signs as panel_signs
 from .html.page_elements import search_area as search_area
 from .html.page_elements import to_latlon as to_latlon
 from .html.page_elements import to_metres as to_metres
+from .layers.answer import answer_layers as answer_layers
+from .layers.cells import cells_layer as cells_layer
+from .layers.evaluation import evaluation_layers as evaluation_layers
+from .layers.evaluation import split_figures as split_figures
 from .layers.hexagons import hexagons_layer as hexagons_layer
-from .layers.layers import answer_layers as answer_layers
-from .layers.layers import cells_layer as cells_layer
-from .layers.layers import evaluation_layers as evaluation_layers
-from .layers.layers import objects_layer as objects_layer
-from .layers.layers import split_figures as split_figures
+from .layers.objects import objects_layer as objects_layer
 from .pages.evaluation_html import evaluation_page as evaluation_page
 from .pages.page import html_page as html_page
 from .pages.page import markdown_page as markdown_page

@@ -27,14 +27,11 @@ from semsig_gis.output.files.tables import (
     write_geoparquet,
 )
 from semsig_gis.output.files.tiles import write_pmtiles
+from semsig_gis.output.layers.answer import answer_layers
+from semsig_gis.output.layers.cells import cells_layer
+from semsig_gis.output.layers.evaluation import evaluation_layers, split_figures
 from semsig_gis.output.layers.hexagons import hexagons_layer
-from semsig_gis.output.layers.layers import (
-    answer_layers,
-    cells_layer,
-    evaluation_layers,
-    objects_layer,
-    split_figures,
-)
+from semsig_gis.output.layers.objects import objects_layer
 from semsig_gis.output.qgis import geopackage
 from semsig_gis.output.qgis.rasters import cell_errors, export_field, export_geotiff
 
@@ -47,7 +44,7 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import Evaluation, Identifiability
     from semsig_gis.localization import Answer, SearchRegions
     from semsig_gis.objects import StreetObjects
-    from semsig_gis.output.layers.layers import Layer
+    from semsig_gis.output.layers.model import Layer
 
 LAYERS = ("cells", "objects", "evaluation", "evaluation_lines", "hexagons")
 """Layers that `export_database` writes."""

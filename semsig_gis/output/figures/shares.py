@@ -39,7 +39,11 @@ AXES: Mapping[str, tuple[str, str]] = {
 P10: Figure = ("error", 10)
 P50: Figure = ("error", 50)
 RECALL10: Figure = ("recall", 10)
-COLUMNS: dict[Figure, str] = {P10: "P(error ≤ 10 m)", P50: "P(error ≤ 50 m)", RECALL10: "recall@10 %"}
+COLUMNS: dict[Figure, str] = {
+    P10: "P(error ≤ 10 m)",
+    P50: "P(error ≤ 50 m)",
+    RECALL10: "recall@10 %",
+}
 
 
 class Share(NamedTuple):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-    from semsig_gis.output.layers.layers import Layer
+    from semsig_gis.output.layers.model import Layer
 
 
 TITLE = "Where the query may have been seen from"

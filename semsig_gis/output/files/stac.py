@@ -16,7 +16,7 @@ from shapely.geometry import box, mapping
 
 from semsig_gis.core import to_degrees
 from semsig_gis.database import database_specs, digest
-from semsig_gis.output.layers.layers import cells_layer
+from semsig_gis.output.layers.cells import cells_layer
 from semsig_gis.storage import write_whole
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from pyarrow import csv
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
 from semsig_gis.core import GEOMETRY, InputError
-from semsig_gis.output.layers.layers import GEOMETRY_TYPES
+from semsig_gis.output.layers.model import GEOMETRY_TYPES
 from semsig_gis.storage import (
     BBOX,
     COVERING,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
     from pathlib import Path
 
-    from semsig_gis.output.layers.layers import Layer, Progress
+    from semsig_gis.output.layers.model import Layer, Progress
 
 
 # Characters that may end a cell, and that may begin a formula. Some spreadsheets accept the

@@ -18,8 +18,9 @@ from pmtiles.writer import Writer
 
 from semsig_gis.core import GEOMETRY, to_degrees
 from semsig_gis.output.files.tables import feature_stream, write_errors
+from semsig_gis.output.layers.cells import cells_layer
 from semsig_gis.output.layers.hexagons import area_statistics
-from semsig_gis.output.layers.layers import cells_layer, table_layer
+from semsig_gis.output.layers.model import table_layer
 from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import Identifiability
-    from semsig_gis.output.layers.layers import Layer, Progress
+    from semsig_gis.output.layers.model import Layer, Progress
 
 
 OMITTED_COLUMNS = {"x", "y", "bearings", "levels", "distances"}

@@ -12,7 +12,7 @@ from pyproj import Transformer
 
 from semsig_gis.core import InputError
 from semsig_gis.database import database_specs
-from semsig_gis.output.layers.layers import group_means, table_layer
+from semsig_gis.output.layers.model import group_means, table_layer
 from semsig_gis.output.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import Evaluation, Identifiability
     from semsig_gis.objects import StreetObjects
-    from semsig_gis.output.layers.layers import Layer
+    from semsig_gis.output.layers.model import Layer
 
 
 FINEST = 15

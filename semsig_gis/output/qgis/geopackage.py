@@ -37,7 +37,7 @@ from semsig_gis.database import database_of
 from semsig_gis.evaluation import identifiability_of
 from semsig_gis.objects import objects_of
 from semsig_gis.output.files.tables import write_errors
-from semsig_gis.output.layers.layers import GEOMETRY_TYPES
+from semsig_gis.output.layers.model import GEOMETRY_TYPES
 from semsig_gis.output.qgis.project import layer_style, project_archive, shown_layers
 from semsig_gis.output.styles import Style
 from semsig_gis.storage import parse_json, whole_file
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import Identifiability
     from semsig_gis.objects import StreetObjects
-    from semsig_gis.output.layers.layers import Layer, Progress
+    from semsig_gis.output.layers.model import Layer, Progress
 
 
 CELLS, OBJECTS = "cells", "objects"

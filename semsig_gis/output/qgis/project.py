@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     import jinja2
 
-    from semsig_gis.output.layers.layers import Layer
+    from semsig_gis.output.layers.model import Layer
     from semsig_gis.output.styles import Style
 else:
     jinja2 = lazy_loader.load("jinja2")

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from semsig_gis.core import CELL_CHANCES, ERROR_BREAKS, FAILURES, InputError, percent
-from semsig_gis.output.layers.layers import group_means
+from semsig_gis.output.layers.model import group_means
 from semsig_gis.output.styles import AMBIGUITY, IDENTIFIABILITY
 from semsig_gis.storage import write_whole
 

@@ -1,0 +1,110 @@
+"""Layers: tables with a geometry, columns and styles, read in blocks of rows."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import shapely
+
+from semsig_gis import __version__
+from semsig_gis.core import (
+    GEOMETRY,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    import geopandas as gpd
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.output.styles import Style
+
+    Progress = Callable[[int, int], None] | None  # called with the numbers of rows: done, all
+
+
+ROWS_A_BLOCK = 1 << 16
+GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Layer:
+    """A table, usually with geometry, that is read in blocks of rows to limit the memory."""
+
+    name: str
+    title: str
+    description: str
+    geometry: str  # polygon, line, point or none
+    crs: CRS
+    rows: int
+    bounds: tuple[float, float, float, float]
+    read: Callable[[slice], pa.Table]  # the geometry, as WKB, is the last column
+    licenses: tuple[str, ...]
+    facts: Mapping[str, Any]  # plain values for JSON
+    styles: tuple[Style, ...] = ()  # the first is the default
+    taxonomy: Taxonomy | None = None  # of the symbols in its texts
+    reach: float = 1.0  # longest visibility range, metres
+
+    @property
+    def credits(self) -> dict[str, Any]:
+        """Licences and program version, for the metadata of a file."""
+        return {"licenses": list(self.licenses), "written_by": f"semsig_gis {__version__}"}
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """Facts and credits, for the metadata of a file."""
+        return {**self.facts, **self.credits}
+
+    @property
+    def metadata_texts(self) -> dict[str, str]:
+        """The metadata with each value as JSON text."""
+        return {key: json.dumps(value, allow_nan=False) for key, value in self.metadata.items()}
+
+    @property
+    def abstract(self) -> str:
+        """The description with the licences, a line each."""
+        return "\n".join([self.description, *self.licenses])
+
+    def blocks(self, progress: Progress = None) -> Iterator[pa.Table]:
+        """Yield the rows in blocks; a layer without rows yields one empty block."""
+        for low in range(0, max(self.rows, 1), ROWS_A_BLOCK):
+            high = min(low + ROWS_A_BLOCK, self.rows)
+            yield self.read(slice(low, high))
+            if progress is not None:
+                progress(high, self.rows)
+
+
+def table_layer(frame: gpd.GeoDataFrame, **about: Any) -> Layer:  # noqa: ANN401 - as `Layer` has
+    """Return a layer of a table in memory; numbers that are not finite become null."""
+    shapes = frame.geometry
+    columns = {}
+    for column in frame.columns.drop(shapes.name):
+        values = frame[column]
+        if pd.api.types.is_float_dtype(values.dtype):
+            numbers = values.to_numpy(np.float64)
+            columns[column] = pa.array(numbers, mask=~np.isfinite(numbers))
+        else:
+            texts = pd.api.types.is_string_dtype(values.dtype)
+            columns[column] = pa.Array.from_pandas(values, type=pa.string() if texts else None)
+    table = pa.table({**columns, GEOMETRY: pa.array(shapely.to_wkb(shapes.array), pa.binary())})
+    return Layer(
+        **about,
+        crs=shapes.crs,
+        rows=len(table),
+        bounds=tuple(shapes.total_bounds.tolist()),
+        read=lambda rows: table.slice(rows.start, rows.stop - rows.start),
+    )
+
+
+def group_means(groups: NDArray[np.int64], values: NDArray[Any], count: int) -> NDArray[np.float64]:
+    """Return the mean of the values in each group (float64, `count`); NaN in an empty group."""
+    numbers = np.bincount(groups, minlength=count)
+    means = np.full(count, np.nan)
+    np.divide(np.bincount(groups, values, count), numbers, out=means, where=numbers > 0)
+    return means

@@ -1,0 +1,63 @@
+"""The layer of the street objects."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+import shapely
+
+from semsig_gis.core import (
+    CLASS_CODE,
+    CLASS_NAME,
+    COUNT,
+    GEOMETRY,
+    MERGED,
+    SOURCE,
+    SOURCE_ID,
+)
+from semsig_gis.objects import objects_specs
+from semsig_gis.output.layers.model import Layer
+from semsig_gis.output.styles import (
+    by_class,
+)
+
+if TYPE_CHECKING:
+    from semsig_gis.objects import StreetObjects
+
+
+def objects_layer(objects: StreetObjects) -> Layer:
+    """Return the layer of the street objects."""
+    classes = {item.code: item for item in objects.taxonomy.classes}
+    texts = [SOURCE, SOURCE_ID, *([MERGED] if MERGED in objects.table.columns else [])]
+
+    def read(rows: slice) -> pa.Table:
+        table = objects.table.iloc[rows]
+        row_classes = [classes[code] for code in objects.codes[rows].tolist()]
+        return pa.table(
+            {
+                CLASS_CODE: objects.codes[rows],
+                "symbol": [item.symbol for item in row_classes],
+                CLASS_NAME: [item.name for item in row_classes],
+                "title": [item.title for item in row_classes],
+                **{name: pa.array(table[name].tolist(), pa.string()) for name in texts},
+                COUNT: table[COUNT].to_numpy(np.int32),
+                GEOMETRY: shapely.to_wkb(table.geometry.array),
+            }
+        )
+
+    return Layer(
+        name="objects",
+        title="Street objects",
+        description=f"The {len(objects)} street objects.",
+        geometry="point",
+        crs=objects.crs,
+        rows=len(objects),
+        bounds=(*objects.xy.min(axis=0).tolist(), *objects.xy.max(axis=0).tolist()),
+        read=read,
+        licenses=tuple(map(str, objects.licenses)),
+        facts={**objects_specs(objects), "crs": objects.crs.to_json_dict()},
+        styles=(by_class(objects.taxonomy, objects.class_counts),),
+        taxonomy=objects.taxonomy,
+    )
