@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from semsig_gis.cli.console import (
-    MOST_METRES,
     AsJson,
     Database,
     Scheduler,
     Workers,
     app,
     keep_inputs,
-    known_identifiability,
-    numbers,
     print_json,
     print_rows,
     print_tables,
@@ -31,141 +26,8 @@ from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.database import Companion
-    from semsig_gis.objects import StreetObjects
 
 MB = 1e6
-
-
-@app.command()
-def build(
-    objects: Annotated[Path, typer.Argument(help="Street objects written by `semsig load`.")],
-    *,
-    out: Annotated[
-        Path, typer.Option(help="Signature database to write (.parquet), or a folder with tiles.")
-    ],
-    step: Annotated[
-        float, typer.Option(min=0.01, max=100_000, help="Side of a cell in metres.")
-    ] = 10.0,
-    radius: Annotated[
-        float,
-        typer.Option(
-            min=0.01,
-            max=6000,
-            help="Visibility range in metres for classes without a range in the catalogue.",
-        ),
-    ] = 30.0,
-    levels: Annotated[int, typer.Option(min=1, max=255, help="Number of angle levels.")] = 16,
-    origin: Annotated[
-        str, typer.Option(help="Corner of a cell as X,Y in metres, in the CRS of the objects.")
-    ] = "0,0",
-    buildings: Annotated[
-        Path | None, typer.Option(help="Building footprints that hide what is behind them.")
-    ] = None,
-    streets: Annotated[Path | None, typer.Option(help="Centre lines of streets.")] = None,
-    viewpoints: Annotated[
-        Literal["all", "outdoor", "streets"],
-        typer.Option(
-            help="Viewpoints: every cell, outdoor cells or cells near streets (needs --streets)."
-        ),
-    ] = "all",
-    street_width: Annotated[
-        float,
-        typer.Option(
-            min=0.1, max=400, help="Default street width in metres, where --streets has none."
-        ),
-    ] = 16.0,
-    area: Annotated[
-        Path | None,
-        typer.Option(help="Keep the cells in WEST,SOUTH,EAST,NORTH in degrees, or in polygons."),
-    ] = None,
-    tile: Annotated[
-        float | None,
-        typer.Option(
-            min=1,
-            max=MOST_METRES,
-            help="Tile size in metres; 2000 with --workers or --scheduler.",
-        ),
-    ] = None,
-    workers: Workers = 0,
-    scheduler: Scheduler = None,
-    as_json: AsJson = False,
-) -> None:
-    """Build a signature database from street objects."""
-    from semsig_gis.core import GridSpec, SignatureSpec
-    from semsig_gis.database import ViewpointSpec, open_city
-    from semsig_gis.objects import open_objects, read_area
-    from semsig_gis.storage import EMPTY_BOX
-
-    if streets is not None and viewpoints != "streets":
-        raise InputError("--streets is used only with --viewpoints streets; give both or neither.")
-    keep_inputs(out, read=(objects, buildings, streets, area))
-    grid = GridSpec(step, tuple(numbers(origin, "--origin")))  # type: ignore[arg-type]
-    spec = SignatureSpec(radius, levels)
-    in_tiles = tile is not None or workers or scheduler is not None
-    if not in_tiles:
-        require_suffix(".parquet", out)
-    # The objects of tiles are read tile by tile; here only their CRS is needed.
-    opened = open_objects(objects, box=EMPTY_BOX if in_tiles else None)
-    polygons = None if area is None else read_area(area, crs=opened.crs)
-    specs: dict[str, Any] = {
-        "grid": grid,
-        "spec": spec,
-        "viewpoints": ViewpointSpec(mode=viewpoints, width=street_width / 2, area=polygons),
-    }
-    if not in_tiles:
-        cells, entries = _build_whole(opened, out, buildings, streets, specs)
-    else:
-        from semsig_gis.database import TileSpec, build_tiles
-
-        with progress("building tiles") as advance:
-            manifest = build_tiles(
-                objects,
-                out,
-                tile=None if tile is None else TileSpec(tile),
-                buildings=buildings,
-                streets=streets,
-                workers=workers,
-                scheduler=scheduler,
-                progress=advance,
-                tell=remark,
-                **specs,
-            )
-        cells, entries = manifest.cells, manifest.entries
-    if as_json:
-        print_json(_info(out))
-        return
-    size = open_city(out).bytes / 1e6
-    say(f"{cells:,} cells of mean length {entries / cells:.3f}, {size:.1f} MB: {out}")
-
-
-def _build_whole(
-    objects: StreetObjects,
-    out: Path,
-    buildings: Path | None,
-    streets: Path | None,
-    specs: dict[str, Any],
-) -> tuple[int, int]:
-    """Write a database in one file with its object store; return its cells and entries."""
-    from semsig_gis.database import ObjectStore, build_database, save_with_store
-    from semsig_gis.objects import read_surroundings
-
-    notes: list[str] = []
-    read = partial(read_surroundings, crs=objects.crs, tell=notes.append)
-    houses = None if buildings is None else read(buildings, role="buildings")
-    lines = None if streets is None else read(streets, role="streets")
-    if houses is not None and (invalid := int((~houses.is_valid).sum())):
-        notes.append(
-            f"{invalid} building footprints in {buildings} are invalid polygons; they were repaired"
-        )
-    for note in notes:
-        remark(note)
-    objects = replace(objects, notes=(*objects.notes, *notes))
-    with progress("building") as advance:
-        database = build_database(
-            objects, footprints=houses, streets=lines, progress=advance, **specs
-        )
-    save_with_store(database, ObjectStore.of(objects, footprints=houses, streets=lines), out)
-    return len(database), len(database.codes)
 
 
 @app.command()
@@ -251,40 +113,6 @@ def merge(
         f"{report.shared_cells:,} cells and {report.shared_objects:,} objects; "
         f"{report.recomputed:,} cells near both were computed again."
     )
-
-
-@app.command()
-def info(database: Database, *, as_json: AsJson = False) -> None:
-    """Print the properties of a database next to those in the paper."""
-    if as_json:
-        print_json(_info(database))
-        return
-    from semsig_gis.database import companions, open_city
-    from semsig_gis.output import database_tables, identifiability_tables
-
-    city = open_city(database)
-    counts = city.object_counts
-    print_tables(database_tables(city.database, file_bytes=city.bytes, object_counts=counts))
-    columns = known_identifiability(city)
-    if columns is not None:
-        print_tables(identifiability_tables(columns, object_counts=counts))
-    if files := companions(database):
-        print_rows("Files of the database", ("File", "What", "MB"), map(_companion_row, files))
-    for line in city.licenses:
-        say(line)
-
-
-def _info(path: Path) -> dict[str, Any]:
-    from semsig_gis.database import companions, database_summary, open_city
-
-    city = open_city(path)
-    counts = city.object_counts
-    summary = database_summary(city.database, file_bytes=city.bytes, object_counts=counts)
-    columns = known_identifiability(city)
-    if columns is not None:
-        summary["identifiability"] = columns.summary(object_counts=counts)
-    summary["beside"] = [file.to_dict() for file in companions(path)]
-    return summary
 
 
 def _companion_row(file: Companion) -> tuple[str, str, str]:

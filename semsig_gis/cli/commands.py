@@ -4,6 +4,7 @@ from semsig_gis.cli.console import app
 
 # isort: off
 from semsig_gis.cli import (  # noqa: F401
+    app as made,
     demo,
     load,
     build,

@@ -404,3 +404,25 @@ def print_tables(tables: Iterable[Table]) -> None:
         print_rows(table.title, table.columns, table.rows)
         if table.note:
             say(table.note)
+
+
+def print_table(table: Table) -> None:
+    """Print a table with its note."""
+    print_rows(table.title, table.columns, table.rows)
+    if table.note:
+        say(table.note)
+
+
+class _Console:
+    """Shows progress and remarks on standard error."""
+
+    def progress(
+        self, label: str, *, unit: Literal["steps", "bytes"] = "steps"
+    ) -> contextlib.AbstractContextManager[Callable[[int, int], None]]:
+        return progress(label, unit=unit)
+
+    def remark(self, text: str) -> None:
+        remark(text)
+
+
+REPORTER = _Console()

@@ -61,6 +61,7 @@ from .parallel import run_tasks as run_tasks
 from .plugins import CATALOGS as CATALOGS
 from .plugins import READERS as READERS
 from .plugins import installed_catalogs as installed_catalogs
+from .plugins import installed_commands as installed_commands
 from .plugins import installed_readers as installed_readers
 from .presentation import map_with as map_with
 from .presentation import plot_with as plot_with

@@ -14,7 +14,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core.errors import CatalogError, InputError, SourceError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 CATALOGS = "semsig_gis.catalogs"
 READERS = "semsig_gis.readers"
+COMMANDS = "semsig_gis.commands"
 
 
 def installed_catalogs(*, reserved: Collection[str] = ()) -> Mapping[str, Path]:
@@ -42,6 +43,15 @@ def installed_readers(*, reserved: Collection[str] = ()) -> Mapping[str, Callabl
     a function is skipped with a warning.
     """
     return _installed(READERS, _function, reserved, SourceError)
+
+
+def installed_commands(*, reserved: Collection[str] = ()) -> Mapping[str, Callable[..., Any]]:
+    """Return the classes of other packages' commands by name, sorted.
+
+    InputError if a name is in `reserved` or provided twice. An entry that fails to load or is not
+    a class is skipped with a warning.
+    """
+    return _installed(COMMANDS, _function, reserved, InputError)
 
 
 def _installed(

@@ -12,6 +12,8 @@ from semsig_gis.core.text import escaped
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
+LARGEST_COUNT = 10**9  # larger whole numbers are identifiers
+
 
 @dataclass(frozen=True, slots=True)
 class Table:
@@ -54,6 +56,18 @@ class Table:
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     bold: frozenset[tuple[int, int]] = frozenset()
     intervals: Mapping[tuple[int, int], str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, title: str, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> Table:
+        """Return a table of values; whole numbers get thousands separators, identifiers do not."""
+        texts = (
+            tuple(
+                f"{cell:,}" if isinstance(cell, int) and abs(cell) < LARGEST_COUNT else str(cell)
+                for cell in row
+            )
+            for row in rows
+        )
+        return cls(title, tuple(columns), tuple(texts))
 
     @classmethod
     def of_columns(cls, title: str, columns: Mapping[str, Iterable[str]], note: str = "") -> Table:

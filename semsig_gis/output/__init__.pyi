@@ -121,6 +121,7 @@ from .styles import CLASS_MARKERS as CLASS_MARKERS
 from .styles import IDENTIFIABILITY as IDENTIFIABILITY
 from .styles import by_class as by_class
 from .styles import by_outcome as by_outcome
+from .tables.database import companion_table as companion_table
 from .tables.database import database_tables as database_tables
 from .tables.evaluation import comparison_sentence as comparison_sentence
 from .tables.evaluation import comparison_table as comparison_table

@@ -10,9 +10,9 @@ from semsig_gis.evaluation import published as paris
 from semsig_gis.output.tables.tables import distortion_rows, note_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database import Companion, SignatureDatabase
 
 MOST_TYPES = 20  # symbols that fit into a table
 GROUP_LABELS = {"alone": "cells alone in their group", "entropy_bits": "entropy, in bits"}
@@ -28,6 +28,12 @@ def database_tables(
     facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
     tables = (_occurrence_table, _property_table, _group_table, _class_table)
     return (*(table(facts) for table in tables), *note_tables(facts["notes"]))
+
+
+def companion_table(title: str, companions: Iterable[Companion]) -> Table:
+    """Return a table of the files that belong to a database."""
+    rows = ((file.path.name, file.what, f"{file.bytes / 1e6:,.1f}") for file in companions)
+    return Table(title, ("File", "What", "MB"), tuple(rows))
 
 
 def _occurrence_table(facts: Mapping[str, Any]) -> Table:

@@ -1,0 +1,202 @@
+"""`semsig build`: a signature database from street objects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from semsig_gis.commands.info import Info
+from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.commands.options import MOST_METRES, Scheduler, Workers, numbers
+from semsig_gis.core import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from semsig_gis.core import Table
+    from semsig_gis.objects import StreetObjects
+
+
+@command(
+    "build",
+    title="Build signature database",
+    group="Databases",
+    order=1,
+    returns=dict[str, Any],
+)
+@dataclass(frozen=True, kw_only=True)
+class Build:
+    """Build a signature database from street objects.
+
+    The city is divided into square cells. For each it is stored which street objects are seen from
+    its centre, clockwise from north: its signature. Cells that see nothing are left out. A folder
+    with the street objects, ready to be searched, is written next to the database.
+    """
+
+    objects: Annotated[
+        Path,
+        Option(
+            "Street objects written by `semsig load`.",
+            title="Street objects",
+            positional=True,
+            reads=True,
+        ),
+    ]
+    out: Annotated[
+        Path,
+        Option(
+            "Signature database to write (.parquet), or a folder with tiles.",
+            title="Signature database",
+            writes="",
+        ),
+    ]
+    step: Annotated[
+        float, Option("Side of a cell.", title="Side of a cell", unit="m", low=0.01, high=100_000)
+    ] = 10.0
+    radius: Annotated[
+        float,
+        Option(
+            "Visibility range for classes without a range in the catalogue.",
+            title="Visibility range",
+            unit="m",
+            low=0.01,
+            high=6000,
+        ),
+    ] = 30.0
+    levels: Annotated[
+        int,
+        Option(
+            "Number of equal sectors in which the methods of the paper compare bearings.",
+            title="Angle levels",
+            low=1,
+            high=255,
+            advanced=True,
+        ),
+    ] = 16
+    origin: Annotated[
+        str,
+        Option(
+            "Corner of a cell in metres, in the CRS of the objects.", metavar="X,Y", advanced=True
+        ),
+    ] = "0,0"
+    buildings: Annotated[
+        Path | None, Option("Building footprints that hide what is behind them.", reads=True)
+    ] = None
+    streets: Annotated[
+        Path | None, Option("Centre lines, for viewpoints near streets.", reads=True)
+    ] = None
+    viewpoints: Annotated[
+        Literal["all", "outdoor", "streets"],
+        Option("Viewpoints: every cell, outdoor cells or cells near streets (needs --streets)."),
+    ] = "all"
+    street_width: Annotated[
+        float,
+        Option(
+            "Default street width, where --streets has none.",
+            unit="m",
+            low=0.1,
+            high=400,
+            advanced=True,
+        ),
+    ] = 16.0
+    area: Annotated[
+        Path | None,
+        Option(
+            "Keep the cells in this box in degrees, or in polygons.",
+            metavar="WEST,SOUTH,EAST,NORTH|FILE",
+            reads=True,
+        ),
+    ] = None
+    tile: Annotated[
+        float | None,
+        Option(
+            "Tile size; 2000 with --workers or --scheduler.",
+            title="Tile size",
+            unit="m",
+            low=1,
+            high=MOST_METRES,
+            advanced=True,
+        ),
+    ] = None
+    workers: Workers = 0
+    scheduler: Scheduler = None
+
+    def run(self, reporter: Reporter) -> Result:
+        """Write the database; return its properties."""
+        from semsig_gis.core import GridSpec, SignatureSpec
+        from semsig_gis.database import TileSpec, ViewpointSpec, build_tiles
+        from semsig_gis.objects import open_objects, read_area
+        from semsig_gis.storage import EMPTY_BOX
+
+        if self.streets is not None and self.viewpoints != "streets":
+            raise InputError(
+                "--streets is used only with --viewpoints streets; give both or neither."
+            )
+        in_tiles = self.tile is not None or self.workers or self.scheduler is not None
+        if not in_tiles and self.out.suffix.lower() != ".parquet" and not self.out.is_dir():
+            raise InputError(f"{self.out} cannot be written; the name must end in .parquet.")
+        grid = GridSpec(self.step, tuple(numbers(self.origin, "--origin")))  # type: ignore[arg-type]
+        spec = SignatureSpec(self.radius, self.levels)
+        # The objects of tiles are read tile by tile; here only their CRS is needed.
+        objects = open_objects(self.objects, box=EMPTY_BOX if in_tiles else None)
+        polygons = None if self.area is None else read_area(self.area, crs=objects.crs)
+        width = self.street_width / 2
+        specs: dict[str, Any] = {
+            "grid": grid,
+            "spec": spec,
+            "viewpoints": ViewpointSpec(mode=self.viewpoints, width=width, area=polygons),
+        }
+        if not in_tiles:
+            cells, entries = self._build_whole(objects, specs, reporter)
+        else:
+            with reporter.progress("building tiles") as advance:
+                manifest = build_tiles(
+                    self.objects,
+                    self.out,
+                    tile=None if self.tile is None else TileSpec(self.tile),
+                    buildings=self.buildings,
+                    streets=self.streets,
+                    workers=self.workers,
+                    scheduler=self.scheduler,
+                    progress=advance,
+                    tell=reporter.remark,
+                    **specs,
+                )
+            cells, entries = manifest.cells, manifest.entries
+        properties = Info(database=self.out).run(reporter)
+        return replace(properties, text=self._text(cells, entries))
+
+    def _build_whole(
+        self, objects: StreetObjects, specs: dict[str, Any], reporter: Reporter
+    ) -> tuple[int, int]:
+        """Write a database in one file with its object store; return its cells and entries."""
+        from semsig_gis.database import ObjectStore, build_database, save_with_store
+        from semsig_gis.objects import read_surroundings
+
+        notes: list[str] = []
+        read = partial(read_surroundings, crs=objects.crs, tell=notes.append)
+        houses = None if self.buildings is None else read(self.buildings, role="buildings")
+        lines = None if self.streets is None else read(self.streets, role="streets")
+        if houses is not None and (invalid := int((~houses.is_valid).sum())):
+            notes.append(
+                f"{invalid} building footprints in {self.buildings} are invalid polygons; they "
+                "were repaired"
+            )
+        for note in notes:
+            reporter.remark(note)
+        objects = replace(objects, notes=(*objects.notes, *notes))
+        with reporter.progress("building") as advance:
+            database = build_database(
+                objects, footprints=houses, streets=lines, progress=advance, **specs
+            )
+        store = ObjectStore.of(objects, footprints=houses, streets=lines)
+        save_with_store(database, store, self.out)
+        return len(database), len(database.codes)
+
+    def _text(self, cells: int, entries: int) -> Iterator[str | Table]:
+        from semsig_gis.database import open_city
+
+        size = open_city(self.out).bytes / 1e6
+        yield f"{cells:,} cells of mean length {entries / cells:.3f}, {size:.1f} MB: {self.out}"

@@ -1,0 +1,357 @@
+"""The parts of a command: options, fields, requests, results, and the registry of commands."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import importlib
+import inspect
+import os
+import pkgutil
+import shlex
+import types
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Literal,
+    Protocol,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from semsig_gis.core import InputError, installed_commands
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from contextlib import AbstractContextManager
+
+    from semsig_gis.core import Table
+
+GROUPS = ("Street objects", "Databases", "Localization", "Detectors", "Accuracy", "Results")
+"""Headings under which front ends list the commands, in their order."""
+
+Advance = Callable[[int, int], None]
+"""Receives the amount of finished work and the total."""
+
+
+class Reporter(Protocol):
+    """Shows the progress and the remarks of a command while it runs."""
+
+    def progress(
+        self, label: str, *, unit: Literal["steps", "bytes"] = "steps"
+    ) -> AbstractContextManager[Advance]:
+        """Show the progress of the work in a block."""
+
+    def remark(self, text: str) -> None:
+        """Show a sentence that is not part of the result."""
+
+
+class _Silent:
+    """A reporter that shows nothing."""
+
+    def progress(
+        self,
+        _label: str,
+        *,
+        unit: Literal["steps", "bytes"] = "steps",  # noqa: ARG002 - as in `Reporter`
+    ) -> AbstractContextManager[Advance]:
+        return contextlib.nullcontext(lambda _completed, _total: None)
+
+    def remark(self, _text: str) -> None:
+        pass
+
+
+SILENT: Reporter = _Silent()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What a command returns.
+
+    `values` returns plain values for JSON, or with `stream` an iterator of them, one for each
+    line. `text` has the lines and tables to read; they may be computed while they are read. None:
+    the result has no such form.
+    """
+
+    values: Callable[[], Any] | None = None
+    text: Iterable[str | Table] | None = None
+    stream: bool = False
+
+
+@dataclass(frozen=True)
+class Option:
+    """What a front end needs to offer a field of a request.
+
+    Parameters
+    ----------
+    help : str
+        One or two sentences for the user.
+    title : str, optional
+        A few words for dialogs; by default the name of the field.
+    unit : str, optional
+        Unit of a number, such as ``m`` or ``°``.
+    low, high : float, optional
+        Smallest and largest number.
+    metavar : str, optional
+        Word for the value in the help, such as ``LAT,LON,SIGMA``; by default from the type and
+        the unit.
+    default : str, optional
+        Description of the default if it is not a plain value.
+    positional : bool, default False
+        Whether the command line takes the value without the name of an option.
+    advanced : bool, default False
+        Whether only `--help-all` and the advanced part of dialogs show it.
+    reads : bool, default False
+        Whether the value is a file or folder that is read.
+    writes : str or tuple of str, optional
+        Suffixes of the file that is written, one or several; ``""`` accepts any, also a folder.
+    suggestions : callable, optional
+        Returns names that the value may have besides others, for completion.
+    short : str, optional
+        Short name on the command line, such as ``-q``.
+    """
+
+    help: str
+    title: str = dataclasses.field(default="", kw_only=True)
+    unit: str = dataclasses.field(default="", kw_only=True)
+    low: float | None = dataclasses.field(default=None, kw_only=True)
+    high: float | None = dataclasses.field(default=None, kw_only=True)
+    metavar: str = dataclasses.field(default="", kw_only=True)
+    default: str = dataclasses.field(default="", kw_only=True)
+    positional: bool = dataclasses.field(default=False, kw_only=True)
+    advanced: bool = dataclasses.field(default=False, kw_only=True)
+    reads: bool = dataclasses.field(default=False, kw_only=True)
+    writes: str | tuple[str, ...] | None = dataclasses.field(default=None, kw_only=True)
+    suggestions: Callable[[], Sequence[str]] | None = dataclasses.field(default=None, kw_only=True)
+    short: str = dataclasses.field(default="", kw_only=True)
+
+
+METAVARS = {"m": "METRES", "°": "DEGREES", "s": "SECONDS", "years": "YEARS"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Field:
+    """A field of a request: its option with its name, type and default.
+
+    `kind` is the type of one value: bool, int, float, str or Path. `choices` are its only values.
+    """
+
+    name: str
+    option: Option
+    kind: type
+    annotation: Any
+    choices: tuple[str, ...] = ()
+    many: bool = False
+    optional: bool = False  # None is accepted
+    required: bool = False
+    default: Any = None
+
+    @property
+    def flag(self) -> str:
+        """The name on the command line."""
+        name = self.name.strip("_").replace("_", "-")
+        return name if self.option.positional else f"--{name}"
+
+    @property
+    def title(self) -> str:
+        """The title in dialogs."""
+        return self.option.title or self.name.strip("_").replace("_", " ").capitalize()
+
+    @property
+    def metavar(self) -> str:
+        """The word for the value in the help."""
+        option = self.option
+        if option.metavar:
+            return option.metavar
+        if self.choices:
+            return "|".join(self.choices)
+        if self.kind is Path:
+            return "FILE"
+        if self.kind in {int, float}:
+            return METAVARS.get(option.unit, "NUMBER")
+        return "TEXT"
+
+    def words(self, value: Any) -> list[str]:  # noqa: ANN401 - as many types as fields
+        """Return a value as words of a command line; none for the default."""
+        if value == self.default or value is None:
+            return []
+        if self.option.positional:
+            return [str(item) for item in (value if self.many else [value])]
+        if self.kind is bool:
+            return [self.flag if value else self.flag.replace("--", "--no-", 1)]
+        items = value if self.many else [value]
+        return [word for item in items for word in (self.flag, _text(item))]
+
+
+def _text(value: object) -> str:
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A command: its name, its group, the class of its requests and the type of its values."""
+
+    name: str
+    title: str
+    group: str
+    order: int
+    request: type[Any]
+    returns: Any
+
+    @property
+    def help(self) -> str:
+        """The description: a first line, and paragraphs."""
+        return inspect.getdoc(self.request) or ""
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """The fields of a request, inputs without a name first."""
+        return fields_of(self.request)
+
+
+def fields_of(request: type[Any]) -> tuple[Field, ...]:
+    """Return the fields of a class of requests, positional fields first."""
+    hints = get_type_hints(request, include_extras=True)
+    fields = [_field(field, hints[field.name]) for field in dataclasses.fields(request)]
+    return tuple(sorted(fields, key=lambda field: not field.option.positional))
+
+
+def _field(field: dataclasses.Field[Any], hint: Any) -> Field:  # noqa: ANN401 - any annotation
+    option = next(item for item in hint.__metadata__ if isinstance(item, Option))
+    annotation = plain = get_args(hint)[0]
+    optional = get_origin(plain) in {Union, types.UnionType}
+    if optional:
+        (plain,) = (item for item in get_args(plain) if item is not type(None))
+    many = get_origin(plain) in {list, tuple}
+    if many:
+        plain = get_args(plain)[0]
+    choices = get_args(plain) if get_origin(plain) is Literal else ()
+    required = field.default is dataclasses.MISSING
+    return Field(
+        name=field.name,
+        option=option,
+        kind=str if choices else plain,
+        annotation=annotation,
+        choices=choices,
+        many=many,
+        optional=optional,
+        required=required,
+        default=None if required else field.default,
+    )
+
+
+_COMMANDS: dict[str, Command] = {}
+T = TypeVar("T")
+
+
+def command(
+    name: str,
+    *,
+    title: str,
+    group: str,
+    order: int,
+    returns: Any = None,  # noqa: ANN401 - any type
+) -> Callable[[type[T]], type[T]]:
+    """Return a decorator that registers a frozen dataclass as a command.
+
+    The class has fields that are annotated with an `Option`, and a method ``run(reporter)`` that
+    returns a `Result`. Its docstring is the help. `order` sorts the commands of a group, and
+    `returns` is the type of the values of the result, usually a TypedDict; None: it has none.
+    """
+    if group not in GROUPS:
+        raise InputError(f"{group!r} is no group of commands; give one of {', '.join(GROUPS)}.")
+
+    def register(request: type[T]) -> type[T]:
+        known = _COMMANDS.get(name)
+        if known is not None and known.request.__module__ != request.__module__:
+            raise InputError(
+                f"the command {name!r} is in {known.request.__module__} and in "
+                f"{request.__module__}; rename one of them."
+            )
+        _COMMANDS[name] = Command(
+            name=name, title=title, group=group, order=order, request=request, returns=returns
+        )
+        return request
+
+    return register
+
+
+def commands() -> Mapping[str, Command]:
+    """Return all commands by name, in the order of their groups.
+
+    Those of other packages are classes in the entry points ``semsig_gis.commands``, which
+    `command` decorates.
+    """
+    package = importlib.import_module("semsig_gis.commands")
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{package.__name__}.{module.name}")
+    installed_commands(reserved=_COMMANDS)
+    ordered = sorted(
+        _COMMANDS.values(), key=lambda item: (GROUPS.index(item.group), item.order, item.name)
+    )
+    return {item.name: item for item in ordered}
+
+
+def run_command(request: Any, reporter: Reporter = SILENT) -> Result:  # noqa: ANN401 - any request
+    """Check the files of a request, run it, and return the result.
+
+    Raises InputError if a file would be overwritten that the request reads or writes as well, or
+    the name of a file to write has another suffix.
+    """
+    fields = fields_of(type(request))
+    values = {field.name: getattr(request, field.name) for field in fields}
+    used = {
+        os.path.realpath(path)
+        for field in fields
+        if field.option.reads
+        for path in _paths(values[field.name])
+    }
+    for field in fields:
+        suffixes = field.option.writes
+        path = values[field.name]
+        if suffixes is None or path is None:
+            continue
+        if os.path.realpath(path) in used:
+            raise InputError(
+                f"{path} would be written, but this command uses it for something else as "
+                "well; give another name."
+            )
+        used.add(os.path.realpath(path))
+        accepted = (suffixes,) if isinstance(suffixes, str) else suffixes
+        if accepted != ("",) and path.suffix.lower() not in accepted and not path.is_dir():
+            raise InputError(
+                f"{path} cannot be written; the name must end in {' or '.join(accepted)}."
+            )
+    result: Result = request.run(reporter)
+    return result
+
+
+def _paths(value: Any) -> Iterator[str | Path]:  # noqa: ANN401 - the value of any field
+    """Yield the paths in the value of a field that is read; - is the standard input."""
+    for path in value if isinstance(value, (list, tuple)) else [value]:
+        if path is not None and path != "-":
+            yield path
+
+
+def command_line(request: Any) -> str:  # noqa: ANN401 - any request
+    """Return the line for a shell that runs a request.
+
+    Examples
+    --------
+    >>> from semsig_gis.commands.info import Info
+    >>> command_line(Info(database=Path("my city.parquet")))
+    "semsig info 'my city.parquet'"
+    """
+    (name,) = (item.name for item in _COMMANDS.values() if item.request is type(request))
+    words = [
+        word
+        for field in fields_of(type(request))
+        for word in field.words(getattr(request, field.name))
+    ]
+    return shlex.join(["semsig", name, *words])
