@@ -398,9 +398,12 @@ def warn_if_online(offline: bool, *, tiles: str | None = None) -> None:  # noqa:
         remark(f"the map takes {what} from the web, so it needs a network to be displayed")
 
 
-def print_tables(tables: Iterable[Table]) -> None:
-    """Print tables with their notes."""
+def print_tables(tables: Iterable[Table | str]) -> None:
+    """Print tables with their notes, and sentences between them."""
     for table in tables:
+        if isinstance(table, str):
+            say(table)
+            continue
         print_rows(table.title, table.columns, table.rows)
         if table.note:
             say(table.note)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from semsig_gis.cli.console import (
     chosen_method,
     keep_inputs,
     print_json,
-    print_rows,
+    print_tables,
     progress,
     remark,
     require_suffix,
@@ -35,19 +34,15 @@ from semsig_gis.cli.options import (
     command,
     query_north,
 )
-from semsig_gis.core import LIKELIHOOD, EmptyResultError, InputError, UnknownNameError, percent
+from semsig_gis.core import LIKELIHOOD, EmptyResultError, InputError, UnknownNameError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from semsig_gis.core import Taxonomy
     from semsig_gis.database import City, PartitionedDatabase, SignatureDatabase
     from semsig_gis.localization import (
         Answer,
-        Explanation,
         LikelihoodLocator,
-        Localization,
-        Location,
         Locator,
         Method,
     )
@@ -266,45 +261,21 @@ def _answer_by_city(several: Sequence[LocalizeOptions]) -> None:
     first = several[0]
     with progress("answering"):
         locations, elsewhere = locate_in_areas(locators, queries, surely_here=first.surely_here)
+    from semsig_gis.output import cities_tables, city_candidates, likeliest_city
+
     names = [str(options.database) for options in several]
-    cities = list(zip(names, locations, strict=True))
-    name, best = max(cities, key=lambda pair: pair[1].answer.mass)
-    rows = [
-        {"city": name, **candidate}
-        for name, location in cities
-        for candidate in location.to_dict()["candidates"]
-    ]
-    rows = sorted(rows, key=lambda row: -row["chance"])[: first.top]
-    for rank, row in enumerate(rows, 1):
-        row["rank"] = rank
-    chances = {name: 1.0 - location.elsewhere for name, location in cities}
-    if first.as_json:
-        shared = {"city": name, "cities": chances, "elsewhere": elsewhere, "candidates": rows}
-        print_json(best.to_dict() | shared)
+    cities = dict(zip(names, locations, strict=True))
+    if not first.as_json:
+        print_tables(cities_tables(cities, elsewhere, top=first.top))
         return
-    cells = sum(location.cells for location in locations)
-    print_rows(
-        f"{len(rows)} best places in {cells:,} cells of {len(cities)} cities, by likelihood "
-        f"({best.noise} noise)",
-        ("rank", "city", "cell", "lon", "lat", "chance", "types"),
-        [
-            *(
-                (
-                    *(row["rank"], row["city"], row["cell_id"]),
-                    *(f"{row['lon']:.6f}", f"{row['lat']:.6f}"),
-                    *(percent(row["chance"]), row["types"]),
-                )
-                for row in rows
-            ),
-            ("", "elsewhere", "", "", "", percent(elsewhere), ""),
-        ],
-    )
-    for area, chance in chances.items():
-        say(f"{area}: chance {percent(chance)}.")
-    say(f"In {name}:")
-    print_place(best)
-    print_query(best)
-    print_notes(*locations)
+    name, best = likeliest_city(cities)
+    shared = {
+        "city": name,
+        "cities": {name: 1.0 - location.elsewhere for name, location in cities.items()},
+        "elsewhere": elsewhere,
+        "candidates": city_candidates(cities, first.top),
+    }
+    print_json(best.to_dict() | shared)
 
 
 def _with_unplaced(
@@ -400,9 +371,6 @@ def _answer_lines(
         remark(f"{of} could not be answered; the field 'error' of each says why.")
 
 
-RANKS = ("rank_low", "rank_high")
-
-
 def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: View) -> None:
     """Answer a query; draw, write and print the answer."""
     with progress("answering"):
@@ -424,10 +392,9 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
         regions = {"searched": searched} if searched and not options.writes_chances else {}
         print_json(answer.to_dict() | regions)
         return
-    if options.ranking == LIKELIHOOD:
-        print_location(answer)
-    else:
-        print_localization(answer)
+    from semsig_gis.output import answer_tables
+
+    print_tables(answer_tables(answer))
     if options.map_ is not None:
         say(f"map: {options.map_}")
     if options.writes_chances:
@@ -453,208 +420,3 @@ def _write(
     share = REGION_SHARE if options.share is None else options.share
     regions = export_answer(answer, city.database, out, share=share, within=options.within)
     return regions.to_dict()
-
-
-EXPLANATION = (
-    *("verdict", "chance", "seen", "at", "object", "at", "off by", "distance", "source", "id"),
-)
-
-
-def print_location(location: Location) -> None:
-    """Print an answer by likelihood."""
-    columns = location.columns
-    _print_candidates(
-        location,
-        f"{len(columns['rank'])} best places in {location.cells:,} cells, "
-        f"by likelihood ({location.noise} noise)",
-        columns["rank"].tolist(),
-        ("chance", map(percent, columns["chance"].tolist())),
-    )
-    knowledge = location.known
-    if near := knowledge.get("near"):
-        say(
-            f"Known: near {near['lat']:.6f}, {near['lon']:.6f} (lat, lon), x {near['x']:.1f}, "
-            f"y {near['y']:.1f}, ± {near['sigma']:g} m, read as {near['read_as']}."
-        )
-    if area := knowledge.get("area"):
-        say(f"Known: in the area {area['file']}, which has {area['cells']:,} cells.")
-    if popularity := knowledge.get("popularity"):
-        say(f"Known: places are weighted by {popularity['file']}.")
-    if require := knowledge.get("require"):
-        say(f"Known: {require['text']} is in sight, as in {require['cells']:,} cells.")
-    for rank, explanation in enumerate(location.explanations, 1):
-        _print_explanation(rank, explanation, location.north)
-    print_place(location)
-    print_query(location)
-    _print_north(location.north)
-    print_notes(location)
-
-
-def print_localization(localization: Localization) -> None:
-    """Print an answer by distance."""
-    ends = zip(*(localization.columns[name].tolist() for name in RANKS), strict=True)
-    ranks = [str(low) if low == high else f"{low}-{high}" for low, high in ends]
-    _print_candidates(
-        localization,
-        f"{len(ranks)} best of {localization.cells:,} cells, by {localization.used}",
-        ranks,
-        ("distance", (f"{value:.4f}" for value in localization.columns["distance"].tolist())),
-    )
-    if tied := localization.tied_beyond:
-        more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
-        say(f"{more} with the last one.")
-    print_query(localization)
-    _print_north(localization.north)
-    print_notes(localization)
-
-
-def _print_candidates(
-    answer: Answer, title: str, ranks: list[Any], scores: tuple[str, Iterable[str]]
-) -> None:
-    """Print the table of candidates, with a column of scores."""
-    from semsig_gis.core import to_degrees
-
-    columns = answer.columns
-    x, y = columns["x"], columns["y"]
-    lon, lat = (axis.round(7) for axis in to_degrees(answer.crs).transform(x, y))  # as in JSON
-    name, texts = scores
-    places = [
-        [format(value, spec) for value in column.tolist()]
-        for column, spec in zip((x, y, lon, lat), (".1f", ".1f", ".6f", ".6f"), strict=True)
-    ]
-    # Identifiers stay numbers, so that they are printed as such.
-    cells, types = columns["cell_id"].tolist(), columns["types"].tolist()
-    print_rows(
-        title,
-        ("rank", "cell", "x", "y", "lon", "lat", name, "types"),
-        zip(ranks, cells, *places, texts, types, strict=True),
-    )
-
-
-def print_query(answer: Answer) -> None:
-    """Print the query, photo by photo, as it was understood."""
-    view: Any = answer.query  # a view, since the options make one
-    for number, photo in enumerate(view.photos):
-        rows = [row for row, owner in enumerate(view.photo_rows.tolist()) if owner == number]
-        objects = ", ".join(_object_text(view, row, answer.taxonomy) for row in rows) or "nothing"
-        sectors = ", ".join(f"{start:.4g}-{end % 360.0:.4g}°" for start, end in photo.sectors)
-        looked = f"; looked at {sectors}" if sectors else ""
-        north = "" if photo.north_sigma is None else f"; north ± {photo.north_sigma:g}°"
-        if photo.north_sigma == math.inf:
-            north = "; north unknown"
-        of = f" of photo {number + 1}" if len(view.photos) > 1 else ""
-        say(f"Seen{of}: {objects}{looked}{north}.")
-    knowledge: Mapping[str, Any] = getattr(answer, "known", {})
-    for name, label in (("seen", "Seen somewhere"), ("absent", "Not there")):
-        if titles := knowledge.get(name):
-            say(f"{label}: {', '.join(titles)}.")
-
-
-def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
-    """Return an object of a query: ``D 80°, 7.3 m ± 56 %``."""
-    from semsig_gis.core import WILDCARD
-
-    parts = []
-    if view.scores is not None:
-        names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: "unknown"}
-        scores = enumerate(view.scores[row].tolist())
-        parts.append(" or ".join(f"{names[code]} {score:.2g}" for code, score in scores if score))
-    elif view.codes is not None:
-        parts.append(taxonomy.decode(view.codes[row : row + 1]))
-    if view.bearings is not None:
-        parts.append(f"{view.bearings[row]:.4g}°")
-    if view.ranges is not None and not math.isnan(view.ranges[row]):
-        error = math.nan if view.range_errors is None else view.range_errors[row]
-        spread = "" if math.isnan(error) else f" ± {percent(error, 0)}"
-        parts.append(f"{view.ranges[row]:.3g} m{spread}")
-    return " ".join(parts)
-
-
-def _print_north(north: North) -> None:
-    if north.name != "grid":
-        say(f"Bearings are measured from {north}, at {north.turn % 360.0:.1f}° from grid north.")
-
-
-def print_notes(*answers: Answer) -> None:
-    """Print the notes on queries, equal ones once."""
-    for note in dict.fromkeys(note for answer in answers for note in answer.notes):
-        say(f"Note: {note}")
-
-
-def degrees_of(location: Location) -> tuple[float, float]:
-    """Return longitude and latitude of a place, rounded as in JSON."""
-    from semsig_gis.core import to_degrees
-
-    estimate = location.estimate
-    lon, lat = to_degrees(location.crs).transform(estimate.x, estimate.y)
-    return round(lon, 7), round(lat, 7)
-
-
-def print_place(location: Location) -> None:
-    """Print the place of an answer by likelihood, and whether it is certain enough.
-
-    Without an answer, the region comes first, and the position only with "if it is there".
-    """
-    estimate, sure = location.estimate, location.answer.given
-    lon, lat = degrees_of(location)
-    radius, mass = location.rule.radius, percent(location.answer.mass)
-    if not sure:
-        say(f"Cannot tell. {location.region_text}.")
-    if location.doubt:
-        say(location.doubt)
-    best, there = ("", "") if sure else ("Best place: ", "If it is there: ")
-    say(f"{best}{lat:.6f}, {lon:.6f} (lat, lon), within {radius:g} m of it: chance {mass}.")
-    longer, shorter, bearing = estimate.ellipse()
-    say(
-        f"{there or 'Position: '}x {estimate.x:.1f}, y {estimate.y:.1f} ± {estimate.sigma:.1f} m "
-        f"(90 %: {longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across)."
-    )
-    if estimate.heading is not None:
-        north = "north of the query" if there else "North of the query:"
-        say(
-            f"{there}{north} {estimate.heading % 360.0:.1f}° ± {estimate.heading_sigma:.1f}° "
-            f"from {location.north.name} north."
-        )
-    if sure:
-        say(f"{location.region_text}.")
-
-
-def _print_explanation(rank: int, explanation: Explanation, north: North) -> None:
-    """Print the counts of a candidate and, for the best one, its objects."""
-    rows, counts = explanation.rows, explanation.counts
-    outside = len(rows) - sum(counts.values())
-    texts = [f"{count} {verdict}" for verdict, count in counts.items()]
-    summary = ", ".join(texts) + (f"; {outside} outside the photos" if outside else "")
-    x, y = explanation.xy
-    title = f"Rank {rank}, at x {x:.1f}, y {y:.1f}: {summary}"
-    if rank > 1:
-        say(title)
-        return
-
-    def bearing_text(bearing: float | None) -> str:
-        return "" if bearing is None else f"{north.from_grid(bearing):.1f}°"
-
-    def measure(value: float | None, spec: str, unit: str, before: str = "") -> str:
-        return "" if value is None else f"{before}{value:{spec}}{unit}"
-
-    print_rows(
-        title,
-        EXPLANATION,
-        [
-            [
-                row["verdict"],
-                f"{row['chance']:.2f}",
-                row["query_class"] or "",
-                bearing_text(row["query_bearing"]) + measure(row["query_range"], ".1f", " m", ", "),
-                row["object_class"] or "",
-                bearing_text(row["object_bearing"]),
-                measure(row["bearing_error"], "+.1f", "°"),
-                measure(row["distance"], ".1f", " m"),
-                row["source"] or "",
-                row["source_id"] or "",
-            ]
-            for verdict in counts
-            for row in rows
-            if row["verdict"] == verdict
-        ],
-    )

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from semsig_gis.cli.console import AsJson, Database, print_json, print_rows, progress
-from semsig_gis.cli.localize import degrees_of, print_notes, print_place
+from semsig_gis.cli.console import AsJson, Database, print_json, print_tables, progress
 from semsig_gis.cli.options import (
     Day,
     Explain,
@@ -20,11 +19,9 @@ from semsig_gis.cli.options import (
     command,
     query_north,
 )
-from semsig_gis.core import percent
 
 if TYPE_CHECKING:
     from semsig_gis.database import City
-    from semsig_gis.localization import Location
     from semsig_gis.observation import North, Route
 
 
@@ -80,6 +77,7 @@ class RouteOptions(SearchOptions, ViewOptions):
 def route(options: RouteOptions) -> None:
     """Find where the views of a route were seen from."""
     from semsig_gis.database import open_city
+    from semsig_gis.output import route_tables
 
     city = open_city(options.database)
     north = query_north(city, options.north, options.date)
@@ -92,22 +90,4 @@ def route(options: RouteOptions) -> None:
         for name, location in zip(names, locations, strict=True):
             print_json({"id": name, **location.to_dict()}, indent=None)
         return
-    print_rows(
-        f"{len(views)} views of {city.path.name}",
-        ("view", "x", "y", "lon", "lat", "± m, if there", "chance", "answered"),
-        ([name, *_row(location)] for name, location in zip(names, locations, strict=True)),
-    )
-    print_place(locations[-1])
-    print_notes(*locations)
-
-
-def _row(location: Location) -> list[str]:
-    """Return the columns of a place in the table of views."""
-    estimate, decision = location.estimate, location.answer
-    lon, lat = degrees_of(location)
-    return [
-        *(f"{estimate.x:.1f}", f"{estimate.y:.1f}", f"{lon:.6f}", f"{lat:.6f}"),
-        f"{estimate.sigma:.1f}",
-        percent(decision.mass),
-        "yes" if decision.given else "cannot tell",
-    ]
+    print_tables(route_tables(city.path.name, names, locations))

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from semsig_gis.cli.console import AsJson, print_json, print_rows, progress
-from semsig_gis.cli.localize import print_notes, print_place, print_query
+from semsig_gis.cli.console import AsJson, print_json, print_tables, progress
 from semsig_gis.cli.options import QueryOptions, SearchOptions, command, query_north
-from semsig_gis.core import percent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +20,7 @@ def suggest(options: SuggestOptions) -> None:
     """Suggest what to look for next, most useful first."""
     from semsig_gis.database import open_city
     from semsig_gis.localization import next_questions, with_unplaced
+    from semsig_gis.output import question_tables
 
     city = open_city(options.database)
     north = query_north(city, options.north, options.date)
@@ -52,14 +51,4 @@ def suggest(options: SuggestOptions) -> None:
         rows = [question.to_dict() for question in questions]
         print_json({**{name: answer[name] for name in shared}, "questions": rows})
         return
-    print_rows(
-        "What to look for next",
-        ("question", "symbol", "yes", "bits"),
-        [
-            [row.text, row.item.symbol, percent(row.chance), f"{round(row.gain, 4):.3f}"]
-            for row in questions
-        ],
-    )
-    print_place(location)
-    print_query(location)
-    print_notes(location)
+    print_tables(question_tables(questions, location))

@@ -131,5 +131,6 @@ from .noise.table import query_bearings as query_bearings
 from .regions import SearchRegions as SearchRegions
 from .regions import search_regions as search_regions
 from .requirement import Requirement as Requirement
+from .suggest import ClassQuestion as ClassQuestion
 from .suggest import next_questions as next_questions
 from .suggest import with_unplaced as with_unplaced

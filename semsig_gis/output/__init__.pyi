@@ -121,6 +121,12 @@ from .styles import CLASS_MARKERS as CLASS_MARKERS
 from .styles import IDENTIFIABILITY as IDENTIFIABILITY
 from .styles import by_class as by_class
 from .styles import by_outcome as by_outcome
+from .tables.answer import answer_tables as answer_tables
+from .tables.answer import cities_tables as cities_tables
+from .tables.answer import city_candidates as city_candidates
+from .tables.answer import likeliest_city as likeliest_city
+from .tables.answer import question_tables as question_tables
+from .tables.answer import route_tables as route_tables
 from .tables.database import companion_table as companion_table
 from .tables.database import database_tables as database_tables
 from .tables.evaluation import comparison_sentence as comparison_sentence

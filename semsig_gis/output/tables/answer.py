@@ -1,0 +1,348 @@
+"""Answers as tables and sentences, in the order in which a terminal prints them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from semsig_gis.core import WILDCARD, Table, figure, percent, to_degrees
+from semsig_gis.localization import Location
+from semsig_gis.observation import GRID_NORTH, View
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.localization import Answer, ClassQuestion, Explanation, Localization
+    from semsig_gis.observation import North
+
+EXPLANATION = (
+    *("verdict", "chance", "seen", "at", "object", "at", "off by", "distance", "source", "id"),
+)
+
+
+def answer_tables(answer: Location | Localization) -> Iterator[Table | str]:
+    """Yield the tables and sentences that describe an answer.
+
+    Parameters
+    ----------
+    answer : Location or Localization
+        The answer.
+
+    Yields
+    ------
+    Table or str
+        The candidates; by likelihood, what was known of the place, the explanations and the place;
+        then the query as it was understood, its north, and the notes.
+
+    Examples
+    --------
+    >>> from semsig_gis import localize
+    >>> answer = localize(demo_database, demo_database.signature(0), method="types:edit", top=5)
+    >>> next(answer_tables(answer)).title
+    '5 best of 955 cells, by types'
+    """
+    columns, cells = answer.columns, f"{answer.cells:,} cells"
+    if isinstance(answer, Location):
+        ranks = [f"{rank:,}" for rank in columns["rank"].tolist()]
+        title = f"{len(ranks)} best places in {cells}, by likelihood ({answer.noise} noise)"
+        chances = map(percent, columns["chance"].tolist())
+        yield _candidate_table(answer, title, ranks, chance=chances)
+        yield from _known_sentences(answer.known)
+        for rank, explanation in enumerate(answer.explanations, 1):
+            yield _explanation_table(rank, explanation, answer.north)
+        yield from place_sentences(answer)
+    else:
+        ends = zip(*(columns[name].tolist() for name in ("rank_low", "rank_high")), strict=True)
+        ranks = [str(low) if low == high else f"{low}-{high}" for low, high in ends]
+        title = f"{len(ranks)} best of {cells}, by {answer.used}"
+        distances = map(figure, columns["distance"].tolist())
+        yield _candidate_table(answer, title, ranks, distance=distances)
+        if tied := answer.tied_beyond:
+            more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
+            yield f"{more} with the last one."
+    yield from query_sentences(answer)
+    if answer.north != GRID_NORTH:
+        turn = answer.north.turn % 360.0
+        yield f"Bearings are measured from {answer.north}, at {turn:.1f}° from grid north."
+    yield from note_sentences(answer)
+
+
+def cities_tables(
+    locations: Mapping[str, Location], elsewhere: float, *, top: int
+) -> Iterator[Table | str]:
+    """Yield the tables and sentences on a query that may be from any of some cities.
+
+    Parameters
+    ----------
+    locations : mapping of str to Location
+        The answer of each city (see `locate_in_areas`).
+    elsewhere : float
+        Chance that the query is from none of the cities.
+    top : int
+        Number of candidates in the table.
+
+    Yields
+    ------
+    Table or str
+        The candidates of all cities, the chance of each city, and the place and the query of the
+        likeliest.
+    """
+    name, best = likeliest_city(locations)
+    rows = city_candidates(locations, top)
+    cells = sum(location.cells for location in locations.values())
+    yield Table(
+        f"{len(rows)} best places in {cells:,} cells of {len(locations)} cities, by likelihood "
+        f"({best.noise} noise)",
+        ("rank", "city", "cell", "lon", "lat", "chance", "types"),
+        (
+            *(
+                (
+                    *(f"{row['rank']:,}", row["city"], str(row["cell_id"])),
+                    *(f"{row['lon']:.6f}", f"{row['lat']:.6f}"),
+                    *(percent(row["chance"]), row["types"]),
+                )
+                for row in rows
+            ),
+            ("", "elsewhere", "", "", "", percent(elsewhere), ""),
+        ),
+    )
+    for area, location in locations.items():
+        yield f"{area}: chance {percent(1.0 - location.elsewhere)}."
+    yield f"In {name}:"
+    yield from place_sentences(best)
+    yield from query_sentences(best)
+    yield from note_sentences(*locations.values())
+
+
+def likeliest_city(locations: Mapping[str, Location]) -> tuple[str, Location]:
+    """Return the name and the answer of the city with the likeliest place."""
+    return max(locations.items(), key=lambda pair: pair[1].answer.mass)
+
+
+def city_candidates(locations: Mapping[str, Location], top: int) -> list[dict[str, Any]]:
+    """Return the likeliest candidates of all cities as plain values, with the name of the city."""
+    rows = [
+        {"city": name, **candidate}
+        for name, location in locations.items()
+        for candidate in location.to_dict()["candidates"]
+    ]
+    rows = sorted(rows, key=lambda row: -row["chance"])[:top]
+    return [{**row, "rank": rank} for rank, row in enumerate(rows, 1)]
+
+
+def route_tables(
+    city: str, names: Iterable[object], locations: Sequence[Location]
+) -> Iterator[Table | str]:
+    """Yield the tables and sentences on the views of a route.
+
+    Parameters
+    ----------
+    city : str
+        Name of the city.
+    names : iterable
+        Names or numbers of the views.
+    locations : sequence of Location
+        The answer to each view.
+
+    Yields
+    ------
+    Table or str
+        The place of each view, the last place, and the notes.
+    """
+    columns: dict[str, list[str]] = {"view": list(map(str, names))}
+    columns |= _position_columns(
+        locations[0], [(place.estimate.x, place.estimate.y) for place in locations]
+    )
+    columns["± m, if there"] = [f"{place.estimate.sigma:.1f}" for place in locations]
+    columns["chance"] = [percent(place.answer.mass) for place in locations]
+    columns["answered"] = ["yes" if place.answer.given else "cannot tell" for place in locations]
+    yield Table.of_columns(f"{len(locations)} views of {city}", columns)
+    yield from place_sentences(locations[-1])
+    yield from note_sentences(*locations)
+
+
+def question_tables(
+    questions: Iterable[ClassQuestion], location: Location
+) -> Iterator[Table | str]:
+    """Yield the tables and sentences on what to look for next.
+
+    Parameters
+    ----------
+    questions : iterable of ClassQuestion
+        See `next_questions`.
+    location : Location
+        The answer so far.
+
+    Yields
+    ------
+    Table or str
+        The questions, the place, the query and the notes.
+    """
+    rows = (
+        (row.text, row.item.symbol, percent(row.chance), f"{round(row.gain, 4):.3f}")
+        for row in questions
+    )
+    yield Table("What to look for next", ("question", "symbol", "yes", "bits"), tuple(rows))
+    yield from place_sentences(location)
+    yield from query_sentences(location)
+    yield from note_sentences(location)
+
+
+def place_sentences(location: Location) -> Iterator[str]:
+    """Yield the place of an answer by likelihood, and whether it is certain enough.
+
+    Without an answer, the region comes first, and the position only with "if it is there".
+    """
+    estimate, sure = location.estimate, location.answer.given
+    place = _position_columns(location, [(estimate.x, estimate.y)])
+    (x,), (y,), (lon,), (lat,) = place.values()
+    if not sure:
+        yield f"Cannot tell. {location.region_text}."
+    if location.doubt:
+        yield location.doubt
+    best, there = ("", "") if sure else ("Best place: ", "If it is there: ")
+    chance = f"within {location.rule.radius:g} m of it: chance {percent(location.answer.mass)}"
+    yield f"{best}{lat}, {lon} (lat, lon), {chance}."
+    longer, shorter, bearing = estimate.ellipse()
+    yield (
+        f"{there or 'Position: '}x {x}, y {y} ± {estimate.sigma:.1f} m "
+        f"(90 %: {longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across)."
+    )
+    if estimate.heading is not None:
+        north = "north of the query" if there else "North of the query:"
+        yield (
+            f"{there}{north} {estimate.heading % 360.0:.1f}° ± {estimate.heading_sigma:.1f}° "
+            f"from {location.north.name} north."
+        )
+    if sure:
+        yield f"{location.region_text}."
+
+
+def query_sentences(answer: Answer) -> Iterator[str]:
+    """Yield the query, photo by photo, as it was understood."""
+    view = View.of(answer.query)
+    for number, photo in enumerate(view.photos):
+        rows = [row for row, owner in enumerate(view.photo_rows.tolist()) if owner == number]
+        objects = ", ".join(_object_text(view, row, answer.taxonomy) for row in rows) or "nothing"
+        sectors = ", ".join(f"{start:.4g}-{end % 360.0:.4g}°" for start, end in photo.sectors)
+        looked = f"; looked at {sectors}" if sectors else ""
+        north = "" if photo.north_sigma is None else f"; north ± {photo.north_sigma:g}°"
+        if photo.north_sigma == math.inf:
+            north = "; north unknown"
+        of = f" of photo {number + 1}" if len(view.photos) > 1 else ""
+        yield f"Seen{of}: {objects}{looked}{north}."
+    knowledge = answer.known if isinstance(answer, Location) else {}
+    for name, label in (("seen", "Seen somewhere"), ("absent", "Not there")):
+        if titles := knowledge.get(name):
+            yield f"{label}: {', '.join(titles)}."
+
+
+def note_sentences(*answers: Answer) -> Iterator[str]:
+    """Yield the notes on queries, equal ones once."""
+    for note in dict.fromkeys(note for answer in answers for note in answer.notes):
+        yield f"Note: {note}"
+
+
+def _candidate_table(
+    answer: Answer, title: str, ranks: list[str], **scores: Iterable[str]
+) -> Table:
+    """Return the table of candidates, with a column of scores."""
+    columns = answer.columns
+    return Table.of_columns(
+        title,
+        {
+            "rank": ranks,
+            "cell": map(str, columns["cell_id"].tolist()),
+            **_position_columns(answer, np.stack([columns["x"], columns["y"]], axis=1)),
+            **scores,
+            "types": columns["types"].tolist(),
+        },
+    )
+
+
+def _position_columns(answer: Answer, places: ArrayLike) -> dict[str, list[str]]:
+    """Return places in metres and degrees as columns of text, rounded as in JSON."""
+    x, y = np.asarray(places, np.float64).T
+    lon, lat = (axis.round(7) for axis in to_degrees(answer.crs).transform(x, y))
+    forms = {"x": (x, ".1f"), "y": (y, ".1f"), "lon": (lon, ".6f"), "lat": (lat, ".6f")}
+    return {name: [format(value, form) for value in axis] for name, (axis, form) in forms.items()}
+
+
+def _known_sentences(knowledge: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what was known of the place in addition to the query."""
+    if near := knowledge.get("near"):
+        yield (
+            f"Known: near {near['lat']:.6f}, {near['lon']:.6f} (lat, lon), x {near['x']:.1f}, "
+            f"y {near['y']:.1f}, ± {near['sigma']:g} m, read as {near['read_as']}."
+        )
+    if area := knowledge.get("area"):
+        yield f"Known: in the area {area['file']}, which has {area['cells']:,} cells."
+    if popularity := knowledge.get("popularity"):
+        yield f"Known: places are weighted by {popularity['file']}."
+    if require := knowledge.get("require"):
+        yield f"Known: {require['text']} is in sight, as in {require['cells']:,} cells."
+
+
+def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
+    """Return an object of a query: ``D 80°, 7.3 m ± 56 %``."""
+    parts = []
+    if view.scores is not None:
+        names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: "unknown"}
+        scores = enumerate(view.scores[row].tolist())
+        parts.append(" or ".join(f"{names[code]} {score:.2g}" for code, score in scores if score))
+    elif view.codes is not None:
+        parts.append(taxonomy.decode(view.codes[row : row + 1]))
+    if view.bearings is not None:
+        parts.append(f"{view.bearings[row]:.4g}°")
+    if view.ranges is not None and not math.isnan(view.ranges[row]):
+        error = math.nan if view.range_errors is None else view.range_errors[row]
+        spread = "" if math.isnan(error) else f" ± {percent(error, 0)}"
+        parts.append(f"{view.ranges[row]:.3g} m{spread}")
+    return " ".join(parts)
+
+
+def _explanation_table(rank: int, explanation: Explanation, north: North) -> Table | str:
+    """Return the counts of a candidate; for the best one, a table of its objects."""
+    rows, counts = explanation.rows, explanation.counts
+    outside = len(rows) - sum(counts.values())
+    texts = [f"{count} {verdict}" for verdict, count in counts.items()]
+    summary = ", ".join(texts) + (f"; {outside} outside the photos" if outside else "")
+    x, y = explanation.xy
+    title = f"Rank {rank}, at x {x:.1f}, y {y:.1f}: {summary}"
+    if rank > 1:
+        return title
+
+    def measure(value: float | None, spec: str, unit: str, before: str = "") -> str:
+        return "" if value is None else f"{before}{value:{spec}}{unit}"
+
+    def bearing_text(bearing: float | None) -> str:
+        return measure(None if bearing is None else north.from_grid(bearing), ".1f", "°")
+
+    shown = sorted(
+        (row for row in rows if row["verdict"] in counts),
+        key=lambda row: [*counts].index(row["verdict"]),
+    )
+    return Table(
+        title,
+        EXPLANATION,
+        tuple(
+            (
+                row["verdict"],
+                f"{row['chance']:.2f}",
+                row["query_class"] or "",
+                bearing_text(row["query_bearing"]) + measure(row["query_range"], ".1f", " m", ", "),
+                row["object_class"] or "",
+                bearing_text(row["object_bearing"]),
+                measure(row["bearing_error"], "+.1f", "°"),
+                measure(row["distance"], ".1f", " m"),
+                row["source"] or "",
+                row["source_id"] or "",
+            )
+            for row in shown
+        ),
+    )
