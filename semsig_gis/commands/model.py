@@ -262,7 +262,8 @@ def command(
 
     The class has fields that are annotated with an `Option`, and a method ``run(reporter)`` that
     returns a `Result`. Its docstring is the help. `order` sorts the commands of a group, and
-    `returns` is the type of the values of the result, usually a TypedDict; None: it has none.
+    `returns` is the type of the values of the result, usually a TypedDict, or a function that
+    returns it where its module is slow to import; None: it has none.
     """
     if group not in GROUPS:
         raise InputError(f"{group!r} is no group of commands; give one of {', '.join(GROUPS)}.")

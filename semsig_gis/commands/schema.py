@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -61,11 +62,6 @@ class Schema:
 
 def command_schema(item: Command) -> dict[str, Any]:
     """Return the schema of the request and the result of a command."""
-    result: dict[str, Any] | None = None
-    if item.returns is not None:
-        from pydantic import TypeAdapter
-
-        result = TypeAdapter(item.returns).json_schema()
     return {
         "title": item.title,
         "description": item.help,
@@ -76,8 +72,27 @@ def command_schema(item: Command) -> dict[str, Any]:
             "required": [field.name for field in item.fields if field.required],
             "additionalProperties": False,
         },
-        "result": result,
+        "result": result_schema(item),
     }
+
+
+def result_schema(item: Command) -> dict[str, Any] | None:
+    """Return the schema of the values of the result of a command, or of each line of them."""
+    if item.returns is None:
+        return None
+    from pydantic import TypeAdapter
+    from pydantic.json_schema import GenerateJsonSchema
+
+    class Closed(GenerateJsonSchema):
+        """Objects with known keys have no others."""
+
+        def typed_dict_schema(self, schema: Any) -> dict[str, Any]:  # noqa: ANN401 - of pydantic
+            return {"additionalProperties": False, **super().typed_dict_schema(schema)}
+
+    returns = item.returns() if inspect.isfunction(item.returns) else item.returns
+    schema = TypeAdapter(returns).json_schema(mode="serialization", schema_generator=Closed)
+    # References are within the schema of the result, also in the schema of all commands.
+    return {"$id": f"urn:semsig:{item.name}", **schema}
 
 
 def field_schema(field: Field) -> dict[str, Any]:
