@@ -49,7 +49,7 @@ class Build:
         Option(
             "Signature database to write (.parquet), or a folder with tiles.",
             title="Signature database",
-            writes="",
+            writes=(".parquet", ""),
         ),
     ]
     step: Annotated[

@@ -110,7 +110,8 @@ class Option:
     reads : bool, default False
         Whether the value is a file or folder that is read.
     writes : str or tuple of str, optional
-        Suffixes of the file that is written, one or several; ``""`` accepts any, also a folder.
+        Suffixes of the file that is written, the usual one first; ``""`` accepts any, also a
+        folder.
     suggestions : callable, optional
         Returns names that the value may have besides others, for completion.
     short : str, optional
@@ -217,7 +218,8 @@ class Command:
 
 def fields_of(request: type[Any]) -> tuple[Field, ...]:
     """Return the fields of a class of requests, positional fields first."""
-    hints = get_type_hints(request, include_extras=True)
+    # Without `localns`, names in a lambda of an annotation would be looked up in the class.
+    hints = get_type_hints(request, localns={}, include_extras=True)
     fields = [_field(field, hints[field.name]) for field in dataclasses.fields(request)]
     return tuple(sorted(fields, key=lambda field: not field.option.positional))
 
@@ -325,7 +327,7 @@ def run_command(request: Any, reporter: Reporter = SILENT) -> Result:  # noqa: A
             )
         used.add(os.path.realpath(path))
         accepted = (suffixes,) if isinstance(suffixes, str) else suffixes
-        if accepted != ("",) and path.suffix.lower() not in accepted and not path.is_dir():
+        if "" not in accepted and path.suffix.lower() not in accepted and not path.is_dir():
             raise InputError(
                 f"{path} cannot be written; the name must end in {' or '.join(accepted)}."
             )
