@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from semsig_gis.cli.console import REPORTER, app, print_json, print_table, say, talk
+from semsig_gis.cli.console import REPORTER, app, print_json, print_table, remark, say, talk
 from semsig_gis.commands import Command, Field, Result, commands, run_command
 from semsig_gis.core import InputError
 
@@ -101,7 +101,7 @@ def _parameter(field: Field) -> inspect.Parameter:
             name: None if about[name] is None else int(about[name]) for name in ("min", "max")
         }
     if option.positional:
-        about["metavar"] = option.metavar or field.flag.upper()
+        about["metavar"] = option.metavar or None
         parameter = typer.Argument(**about)
     else:
         names = [field.flag, option.short] if option.short else [field.flag]
@@ -117,19 +117,20 @@ def _parameter(field: Field) -> inspect.Parameter:
 
 
 def show(result: Result, *, as_json: bool) -> None:
-    """Print a result on standard output, as JSON or as text."""
-    if result.values is not None and (as_json or result.text is None):
-        if result.stream:
-            for value in result.values():
-                print_json(value, indent=None)
-        else:
-            print_json(result.values())
-        return
-    for part in result.text or ():
-        if isinstance(part, str):
-            say(part)
-        else:
-            print_table(part)
+    """Print a result on standard output, as JSON or as text, and its notes."""
+    if result.values is None or (result.text is not None and not as_json):
+        for part in result.text or ():
+            if isinstance(part, str):
+                say(part)
+            else:
+                print_table(part)
+    elif result.stream:
+        for value in result.values():
+            print_json(value, indent=None)
+    else:
+        print_json(result.values())
+    for note in result.notes:
+        remark(note)
 
 
 for _command in commands().values():

@@ -5,11 +5,6 @@ from semsig_gis.cli.console import app
 # isort: off
 from semsig_gis.cli import (  # noqa: F401
     app as made,
-    demo,
-    load,
-    build,
-    maps,
-    view,
     localize,
     route,
     suggest,
@@ -17,7 +12,6 @@ from semsig_gis.cli import (  # noqa: F401
     learn,
     evaluate,
     benchmark,
-    export,
 )
 
 __all__ = ["app"]

@@ -24,7 +24,6 @@ from semsig_gis.cli.console import (
     say,
     warn_if_online,
 )
-from semsig_gis.cli.maps import draw_ground
 from semsig_gis.cli.options import (
     Explain,
     QueryOptions,
@@ -34,6 +33,7 @@ from semsig_gis.cli.options import (
     command,
     query_north,
 )
+from semsig_gis.commands import draw_ground
 from semsig_gis.core import LIKELIHOOD, EmptyResultError, InputError, UnknownNameError
 
 if TYPE_CHECKING:

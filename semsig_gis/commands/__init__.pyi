@@ -12,3 +12,4 @@ from .model import command_line as command_line
 from .model import commands as commands
 from .model import fields_of as fields_of
 from .model import run_command as run_command
+from .options import draw_ground as draw_ground

@@ -76,12 +76,13 @@ class Result:
 
     `values` returns plain values for JSON, or with `stream` an iterator of them, one for each
     line. `text` has the lines and tables to read; they may be computed while they are read. None:
-    the result has no such form.
+    the result has no such form. `notes` are sentences to show below it.
     """
 
     values: Callable[[], Any] | None = None
     text: Iterable[str | Table] | None = None
     stream: bool = False
+    notes: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ class Option:
         Suffixes of the file that is written, the usual one first; ``""`` accepts any, also a
         folder.
     suggestions : callable, optional
-        Returns names that the value may have besides others, for completion.
+        Returns names that the value may have, among others, for completion.
     short : str, optional
         Short name on the command line, such as ``-q``.
     """
@@ -271,10 +272,10 @@ def command(
         raise InputError(f"{group!r} is no group of commands; give one of {', '.join(GROUPS)}.")
 
     def register(request: type[T]) -> type[T]:
-        known = _COMMANDS.get(name)
-        if known is not None and known.request.__module__ != request.__module__:
+        other = _COMMANDS.get(name)
+        if other is not None and other.request.__module__ != request.__module__:
             raise InputError(
-                f"the command {name!r} is in {known.request.__module__} and in "
+                f"the command {name!r} is in {other.request.__module__} and in "
                 f"{request.__module__}; rename one of them."
             )
         _COMMANDS[name] = Command(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,11 +15,13 @@ from semsig_gis.core import (
     PAPER_METHOD,
     CrsError,
     DatabaseError,
+    EmptyResultError,
     InputError,
 )
 from semsig_gis.localization import METRIC_NAMES
 
 if TYPE_CHECKING:
+    import folium
     from numpy.typing import NDArray
 
     from semsig_gis.core import Signature, Taxonomy
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from semsig_gis.observation import North, View
 
 EXPLAINED = 3  # candidates
+MARGIN_M = 100.0  # of the ground of a map around the cells
 MOST_TOP = 10_000
 # The same limits as in `core` and the specs, which are slow to import.
 MOST_SEED, MOST_METRES, MOST_WORKERS, MOST_QUERIES = 10**18, 1_000_000, 1024, 10_000_000
@@ -632,3 +636,36 @@ def known_identifiability(city: City, reporter: Reporter) -> Identifiability | N
     except DatabaseError as error:
         reporter.remark(str(error))
         return None
+
+
+def draw_ground(
+    map_: folium.Map, city: City, *, buildings: Path | None = None, streets: Path | None = None
+) -> None:
+    """Add streets and buildings to a map, from files or else from the object store."""
+    from semsig_gis.objects import read_surroundings
+    from semsig_gis.output import ground_map
+
+    crs = city.database.crs
+    houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)
+    lines = None if streets is None else read_surroundings(streets, role="streets", crs=crs)
+    if houses is None or lines is None:
+        with contextlib.suppress(DatabaseError):  # a map does not need them
+            houses = city.store.footprints if houses is None else houses
+            lines = city.store.streets if lines is None else lines
+    if houses is None and lines is None:
+        return
+    xy = city.database.xy
+    low, high = xy.min(axis=0) - MARGIN_M, xy.max(axis=0) + MARGIN_M
+    try:
+        box = (*low.tolist(), *high.tolist())
+        ground_map(buildings=houses, streets=lines, box=box, map_=map_)
+    except EmptyResultError:
+        if buildings is not None or streets is not None:
+            raise
+
+
+def online_notes(offline: bool, *, tiles: str | None = None) -> list[str]:  # noqa: FBT001
+    """Return a note if a map needs a network."""
+    what = "Leaflet" if tiles is None else "its tiles"
+    note = f"the map takes {what} from the web, so it needs a network to be displayed"
+    return [] if offline else [note]

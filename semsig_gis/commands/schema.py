@@ -43,18 +43,18 @@ class Schema:
 
     def run(self, _reporter: Reporter) -> Result:
         """Return the schema of the commands, by name."""
-        known = commands()
+        items = commands()
         for name in self.names or ():
-            if name not in known:
-                raise UnknownNameError(
-                    f"there is no command {name!r}{nearest_name(name, known)}; give one of "
-                    f"{', '.join(known)}."
+            if name not in items:
+                raise UnitemsNameError(
+                    f"there is no command {name!r}{nearest_name(name, items)}; give one of "
+                    f"{', '.join(items)}."
                 )
 
         def values() -> dict[str, Any]:
             return {
                 "$schema": DIALECT,
-                "commands": {name: command_schema(known[name]) for name in self.names or known},
+                "commands": {name: command_schema(items[name]) for name in self.names or items},
             }
 
         return Result(values=values)

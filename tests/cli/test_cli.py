@@ -531,7 +531,7 @@ def test_warning_is_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("semsig_gis.objects.draft_catalog", suggest)
     with warnings.catch_warnings(action="always"):
-        assert run("draft x.gpkg") == (0, "draft", "semsig: the file is old\n")
+        assert run("draft x.gpkg") == (0, "draft\n", "semsig: the file is old\n")
 
 
 def test_file_without_a_crs_needs_option(city: Path, run: Run, run_ok: RunOk) -> None:

@@ -1,0 +1,27 @@
+"""`semsig draft`: a catalogue for a vector file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from semsig_gis.commands.load import Crs
+from semsig_gis.commands.model import Option, Reporter, Result, command
+
+
+@command("draft", title="Draft a catalogue", group="Street objects", order=4)
+@dataclass(frozen=True, kw_only=True)
+class Draft:
+    """Draft a catalogue for a vector file, for you to edit."""
+
+    file: Annotated[
+        Path, Option("Vector file to draft a catalogue for.", positional=True, reads=True)
+    ]
+    crs: Crs = None
+
+    def run(self, _reporter: Reporter) -> Result:
+        """Return the lines of the catalogue."""
+        from semsig_gis.objects import draft_catalog
+
+        return Result(text=[draft_catalog(self.file, crs=self.crs).removesuffix("\n")])

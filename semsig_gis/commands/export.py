@@ -1,0 +1,114 @@
+"""`semsig export`: files for other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.commands.options import Database, Smooth, known_identifiability
+from semsig_gis.core import InputError
+
+
+def _layers() -> tuple[str, ...]:
+    """Return the names of layers and rasters."""
+    from semsig_gis.output import LAYERS, RASTERS
+
+    return (*LAYERS, *RASTERS)
+
+
+class Exported(TypedDict):
+    """The file, and the number of cells of the database unless they are only described."""
+
+    exported: str
+    cells: NotRequired[int]
+
+
+@command("export", title="Export to other programs", group="Results", order=2, returns=Exported)
+@dataclass(frozen=True, kw_only=True)
+class Export:
+    """Export cells, objects and queries for QGIS and other programs."""
+
+    database: Database
+    out: Annotated[
+        Path,
+        Option(
+            "File to write. Its suffix is the format: .gpkg (all layers, for QGIS), .parquet, "
+            ".fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), .tif (one number "
+            "per cell) or .json (STAC item).",
+            title="File",
+            writes="",
+        ),
+    ]
+    objects: Annotated[Path | None, Option("Street objects to add as a layer.", reads=True)] = None
+    evaluation: Annotated[
+        Path | None,
+        Option(
+            "Folder written by `semsig evaluate --out`, to add its queries.",
+            metavar="FOLDER",
+            reads=True,
+        ),
+    ] = None
+    layer: Annotated[
+        list[str] | None,
+        Option(
+            "Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; by default "
+            "cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the default), "
+            "identifiability, error, or field (share of the queries around that fail).",
+            metavar="NAME",
+            suggestions=_layers,
+        ),
+    ] = None
+    smooth: Smooth = None
+    h3: Annotated[
+        int | None,
+        Option(
+            "Write hexagons of this resolution of H3, such as 9, that sum up cells, objects and "
+            "queries.",
+            low=0,
+            high=15,
+        ),
+    ] = None
+    geometry: Annotated[
+        Literal["polygon", "point"] | None,
+        Option("How a cell is drawn.", default="as a polygon, in CSV as a point"),
+    ] = None
+
+    def run(self, reporter: Reporter) -> Result:
+        """Write the file."""
+        from semsig_gis.database import open_city
+        from semsig_gis.evaluation import open_evaluation
+        from semsig_gis.objects import open_objects
+        from semsig_gis.output import ITEM, export_database, export_item
+
+        text = [f"exported: {self.out}"]
+        values: Exported = {"exported": str(self.out)}
+        if self.out.suffix.lower() == ITEM:
+            others = (self.evaluation, self.layer, self.smooth, self.h3, self.geometry)
+            if any(option is not None for option in others):
+                raise InputError(
+                    f"{self.out} describes the files of a database; give only --objects with it."
+                )
+            export_item(self.database, self.out, objects=self.objects)
+            return Result(values=lambda: values, text=text)
+        city = open_city(self.database)
+        queries = None if self.evaluation is None else open_evaluation(self.evaluation)
+        # Hexagons count the objects that the database was built from, if they are stored with it.
+        stored = city.objects if self.h3 is not None and self.objects is None else None
+        with reporter.progress(f"writing {self.out.name}") as advance:
+            export_database(
+                city.database,
+                self.out,
+                layers=self.layer or (),
+                objects=stored if self.objects is None else open_objects(self.objects),
+                evaluation=queries,
+                identifiability=known_identifiability(city, reporter),
+                geometry=self.geometry,
+                smooth=self.smooth,
+                h3=self.h3,
+                progress=advance,
+            )
+        return Result(values=lambda: {**values, "cells": len(city.database)}, text=text)

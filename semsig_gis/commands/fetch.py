@@ -1,0 +1,109 @@
+"""`semsig fetch`: street objects from the services of open data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+from semsig_gis.commands.load import LoadOptions, Quality, catalogs
+from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.core import InputError
+
+
+@command("fetch", title="Download street objects", group="Street objects", order=2, returns=Quality)
+@dataclass(frozen=True, kw_only=True)
+class Fetch(LoadOptions):
+    """Download the street objects of an area."""
+
+    catalog: Annotated[
+        str,
+        Option(
+            "Catalogue with a service, by name or .toml.",
+            positional=True,
+            reads=True,
+            suggestions=catalogs,
+        ),
+    ]
+    area: Annotated[
+        str,
+        Option(
+            "Box in degrees, a polygon file, or the name of a place.",
+            metavar="WEST,SOUTH,EAST,NORTH|FILE|PLACE",
+            reads=True,
+        ),
+    ]
+    cache: Annotated[
+        Path | None,
+        Option("Folder of the cache.", metavar="FOLDER", default="semsig's own", advanced=True),
+    ] = None
+    offline: Annotated[bool, Option("Use the cache only.")] = False
+    timeout: Annotated[
+        float,
+        Option(
+            "Give up a download after this time, all attempts together.",
+            unit="s",
+            low=1,
+            high=86_400,
+            advanced=True,
+        ),
+    ] = 600.0
+    server: Annotated[
+        str | None,
+        Option(
+            "Address of a server to use instead of the catalogue's.", metavar="URL", advanced=True
+        ),
+    ] = None
+
+    def run(self, reporter: Reporter) -> Result:
+        """Write the street objects; return their quality report."""
+        from urllib.parse import urlsplit
+
+        from semsig_gis.objects import assemble, choose_layers
+        from semsig_gis.sources import fetch_layers, find_area, load_catalog, open_cache
+
+        catalog = load_catalog(self.catalog)
+        if self.server is not None:
+            if not self.server.startswith(("http://", "https://")):
+                raise InputError(
+                    f"--server is {self.server!r}; give an address that begins with https://."
+                )
+            catalog = replace(catalog, endpoints=(self.server,))
+        specs = choose_layers(
+            catalog,
+            self.layer or (),
+            selection=self.selection,
+            surroundings=bool(self.buildings or self.streets),
+        )
+        store, http = open_cache(
+            self.cache, offline=self.offline, deadline_s=self.timeout, tell=reporter.remark
+        )
+        unit: Literal["steps", "bytes"] = "bytes" if catalog.reader == "opendatasoft" else "steps"
+        hosts = ", ".join(dict.fromkeys(urlsplit(url).netloc for url in catalog.endpoints))
+        if not self.offline:
+            layers_ = f"{len(specs)} layer{'' if len(specs) == 1 else 's'}"
+            reporter.remark(
+                f"asking {hosts} for {layers_} of {self.area}, attempt 1 of {http.attempts}"
+            )
+        with reporter.progress(f"fetching from {hosts}", unit=unit) as advance:
+            place = find_area(self.area, catalog, cache=store, http=http)
+            layers = fetch_layers(
+                specs,
+                catalog,
+                area=place,
+                cache=store,
+                http=http,
+                filters=self.filter,
+                progress=advance,
+                tell=reporter.remark,
+            )
+        with reporter.progress("joining the objects"):
+            loaded = assemble(
+                layers,
+                catalog,
+                metric_crs=self.metric_crs,
+                collapse=self.collapse,
+                merge=self.merge,
+                max_distortion=self.max_distortion,
+            )
+        return self.save(loaded)

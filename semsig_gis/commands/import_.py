@@ -1,0 +1,64 @@
+"""`semsig import`: a database from a GeoPackage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, NotRequired
+
+from typing_extensions import TypedDict
+
+from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.core import InputError
+
+
+class Imported(TypedDict):
+    """The files, and the numbers of cells and street objects in them."""
+
+    database: str
+    cells: int
+    objects: NotRequired[str]
+    street_objects: NotRequired[int]
+
+
+@command("import", title="Import from QGIS", group="Results", order=3, returns=Imported)
+@dataclass(frozen=True, kw_only=True)
+class Import:
+    """Restore a database from an exported GeoPackage."""
+
+    geopackage: Annotated[
+        Path, Option("GeoPackage written by `semsig export`.", positional=True, reads=True)
+    ]
+    out: Annotated[
+        Path,
+        Option(
+            "Signature database to write (.parquet).", title="Signature database", writes=".parquet"
+        ),
+    ]
+    objects: Annotated[
+        Path | None, Option("Street objects to write, if exported.", writes=".parquet")
+    ] = None
+
+    def run(self, reporter: Reporter) -> Result:
+        """Write the database; return its file and its number of cells."""
+        from semsig_gis.database import save_database
+        from semsig_gis.evaluation import save_identifiability
+        from semsig_gis.objects import save_objects
+        from semsig_gis.output import read_geopackage
+
+        contents = read_geopackage(self.geopackage)
+        if self.objects is not None and contents.objects is None:
+            raise InputError(f"{self.geopackage} contains no street objects; leave out --objects.")
+        for note in contents.notes:
+            reporter.remark(note)
+        cells = len(contents.database)
+        values: Imported = {"database": str(self.out), "cells": cells}
+        text = [f"database: {self.out}  ({cells:,} cells)"]
+        if self.objects is not None and contents.objects is not None:
+            save_objects(contents.objects, self.objects, keep_order=True)
+            values |= {"objects": str(self.objects), "street_objects": len(contents.objects)}
+            text.append(f"objects:  {self.objects}")
+        save_database(contents.database, self.out)
+        if contents.identifiability is not None:
+            save_identifiability(contents.identifiability, self.out)
+        return Result(values=lambda: values, text=text)

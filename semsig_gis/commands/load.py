@@ -1,0 +1,245 @@
+"""`semsig load`: street objects from files of open data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+from typing_extensions import TypedDict
+
+from semsig_gis import objects as street_objects
+from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.core import InputError, Table
+
+
+def catalogs() -> tuple[str, ...]:
+    """Return the names of the catalogues."""
+    from semsig_gis.sources import catalog_names
+
+    return catalog_names()
+
+
+Crs = Annotated[
+    str | None,
+    Option("CRS of files that do not state their own, such as EPSG:2154.", metavar="CRS"),
+]
+
+
+class LayerRows(TypedDict):
+    """The rows of a layer: read, left out for a reason, and kept."""
+
+    name: str
+    read: int
+    unreadable: int
+    filtered: int
+    excluded: int
+    outside: int
+    missing: int
+    duplicates: int
+    misplaced: int
+    collapsed: int
+    conflated: int
+    kept: int
+    role: str
+    notes: list[str]
+
+
+class Quality(TypedDict):
+    """The quality report of a load."""
+
+    objects: int
+    classes: list[street_objects.ClassQuality]
+    absent: list[str]
+    sources: list[LayerRows]
+    conflated: list[street_objects.ConflatedPair]
+    crs: str
+    extent: tuple[float, float, float, float]
+    extent_degrees: tuple[float, float, float, float]
+    distortion: dict[str, Any]
+    hull_km2: float
+    occupied_km2: float
+    licenses: list[str]
+    unread: list[street_objects.UnreadLayer]
+    notes: list[str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadOptions:
+    """Fields of the commands that make street objects from a catalogue."""
+
+    out: Annotated[
+        Path,
+        Option("Street objects to write (.parquet).", title="Street objects", writes=".parquet"),
+    ]
+    layer: Annotated[
+        list[str] | None,
+        Option(
+            "Read only this layer, or with +NAME also this one; may be repeated.", metavar="NAME"
+        ),
+    ] = None
+    all_layers: Annotated[bool, Option("Read the optional layers of objects as well.")] = False
+    paper_classes: Annotated[
+        bool, Option("Read only the eleven classes of the paper.", advanced=True)
+    ] = False
+    buildings: Annotated[
+        Path | None, Option("Building footprints to write as well (.parquet).", writes=".parquet")
+    ] = None
+    streets: Annotated[
+        Path | None,
+        Option("Centre lines of streets to write as well (.parquet).", writes=".parquet"),
+    ] = None
+    metric_crs: Annotated[
+        str | None,
+        Option(
+            "CRS in metres to work in.",
+            metavar="CRS",
+            default="the catalogue's or the UTM zone",
+            advanced=True,
+        ),
+    ] = None
+    max_distortion: Annotated[
+        float,
+        Option(
+            "Largest distortion allowed for the CRS: degrees of bearings, percent of lengths.",
+            low=0,
+            high=180,
+            advanced=True,
+        ),
+    ] = 6.0
+    filter: Annotated[bool, Option("Apply the catalogue's filters.", advanced=True)] = True
+    collapse: Annotated[
+        bool, Option("Collapse objects of a class at the same place.", advanced=True)
+    ] = True
+    merge: Annotated[
+        bool,
+        Option("Merge objects of different layers within the catalogue's radii.", advanced=True),
+    ] = True
+
+    @property
+    def selection(self) -> street_objects.Selection:
+        """The layers to read by default."""
+        if self.all_layers and self.paper_classes:
+            raise InputError("--all-layers and --paper-classes are both given; give one of them.")
+        return "all" if self.all_layers else "paper" if self.paper_classes else "default"
+
+    def save(self, loaded: street_objects.Loaded) -> Result:
+        """Write the objects and their surroundings; return their quality report."""
+        notes = list(loaded.notes)
+        street_objects.save_objects(loaded.objects, self.out)
+        for what, table, path in (
+            ("buildings", loaded.buildings, self.buildings),
+            ("streets", loaded.streets, self.streets),
+        ):
+            if path is not None and table is None:
+                notes.append(f"there are no {what} in what was loaded, so {path} is not written")
+            elif path is not None:
+                street_objects.save_surroundings(table, path)
+        report = street_objects.quality_report(
+            loaded.objects, loaded.report, loaded.conflation, notes=notes
+        )
+        return Result(values=report.to_dict, text=self._text(report), notes=notes)
+
+    def _text(self, report: street_objects.QualityReport) -> Iterator[str | Table]:
+        from semsig_gis.output import quality_tables
+
+        # The notes are shown below the tables only.
+        yield from quality_tables(replace(report, notes=()))
+        yield f"street objects: {self.out}"
+
+
+AT_THE_EDGE = (
+    "cells within sight of the edge of the clip see only a part of what is there; give `semsig "
+    "build` an --area that is smaller by the visibility range"
+)
+
+
+@command("load", title="Load street objects", group="Street objects", order=1, returns=Quality)
+@dataclass(frozen=True, kw_only=True)
+class Load(LoadOptions):
+    """Read files of open data into street objects."""
+
+    files: Annotated[
+        list[Path], Option("Files, or a folder of files.", positional=True, reads=True)
+    ]
+    catalog: Annotated[
+        list[str] | None,
+        Option(
+            "Catalogue, by name or .toml file; not needed for OpenStreetMap and Overture. Repeat "
+            "to merge several, best first.",
+            metavar="NAME|FILE",
+            reads=True,
+            suggestions=catalogs,
+        ),
+    ] = None
+    crs: Crs = None
+    clip: Annotated[
+        str | None,
+        Option(
+            "Keep only what is in this box in degrees, in the polygons of a file, or with 'box' "
+            "in the area that OpenStreetMap files state.",
+            metavar="WEST,SOUTH,EAST,NORTH|FILE|box",
+            reads=True,
+        ),
+    ] = None
+
+    def run(self, reporter: Reporter) -> Result:
+        """Write the street objects; return their quality report."""
+        from semsig_gis.sources import (
+            BOX,
+            clip_layers,
+            combine_catalogs,
+            detect_catalogs,
+            load_catalog,
+            parse_area,
+        )
+
+        names = self.catalog
+        if not names:
+            detected, lines = detect_catalogs(self.files)
+            names = list(detected)
+            for line in lines:
+                reporter.remark(line)
+        catalog = combine_catalogs([load_catalog(name) for name in names])
+        specs = street_objects.choose_layers(
+            catalog,
+            self.layer or (),
+            selection=self.selection,
+            surroundings=bool(self.buildings or self.streets),
+        )
+        # Layers in files read anyway: their objects are counted, to say what is left out.
+        others = street_objects.layers_in_same_extracts(catalog, specs)
+        with reporter.progress("reading") as advance:
+            layers, absent = street_objects.read_files(
+                [*specs, *others],
+                self.files,
+                filters=self.filter,
+                crs=self.crs,
+                area=None if self.clip in {None, BOX} else parse_area(self.clip),
+                progress=advance,
+            )
+            layers += street_objects.read_small_layers(
+                catalog, [*specs, *others], self.files, filters=self.filter, crs=self.crs
+            )
+        notes = [
+            f"layer {spec.name!r} has no file here ({', '.join(spec.files) or 'it names none'}); "
+            "it is left out"
+            for spec in absent
+            if spec not in others
+        ]
+        if self.clip is not None:
+            layers = clip_layers(layers, self.clip)
+            notes.append(AT_THE_EDGE)
+        with reporter.progress("joining the objects"):
+            loaded = street_objects.assemble(
+                [layer for layer in layers if layer.spec in specs],
+                catalog,
+                metric_crs=self.metric_crs,
+                collapse=self.collapse,
+                merge=self.merge,
+                counted=[layer for layer in layers if layer.spec not in specs],
+                max_distortion=self.max_distortion,
+                notes=notes,
+            )
+        return self.save(loaded)

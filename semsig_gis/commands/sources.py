@@ -1,0 +1,202 @@
+"""`semsig sources`: the catalogues, or the layers of one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
+
+from typing_extensions import TypedDict
+
+from semsig_gis.commands.load import catalogs
+from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.core import Table
+
+if TYPE_CHECKING:
+    from semsig_gis.sources import Catalog, LayerSpec, Rules
+
+
+class Needs(TypedDict):
+    """What a catalogue needs: files, the network, an area, and a variable with a token."""
+
+    files: bool
+    network: bool
+    area: bool
+    token: str | None
+
+
+class CatalogRow(TypedDict):
+    """A catalogue in the list."""
+
+    name: str
+    title: str
+    place: str
+    needs: Needs
+    classes: list[str]
+    layers: int
+    reader: str
+    license: str
+
+
+class CatalogList(TypedDict):
+    """All catalogues, and the readers for own catalogues."""
+
+    catalogs: list[CatalogRow]
+    readers: list[str]
+
+
+class CatalogDetails(TypedDict):
+    """A catalogue with its layers."""
+
+    name: str
+    title: str
+    taxonomy: dict[str, Any]
+    layers: list[dict[str, Any]]
+    metric_crs: str | None
+    place: str
+    url: str
+    reader: str
+    endpoints: list[str]
+    token: str | None
+    geocoder: str | None
+    conflate: list[tuple[str, float]]
+    license: str
+    attribution: str
+
+
+@command(
+    "sources",
+    title="Catalogues of open data",
+    group="Street objects",
+    order=3,
+    returns=CatalogList | CatalogDetails,
+)
+@dataclass(frozen=True, kw_only=True)
+class Sources:
+    """List the catalogues, or the layers of one."""
+
+    name: Annotated[
+        str | None,
+        Option(
+            "Catalogue, by name or .toml file; default: list all.",
+            positional=True,
+            suggestions=catalogs,
+        ),
+    ] = None
+
+    def run(self, _reporter: Reporter) -> Result:
+        """Return the catalogues, or one of them."""
+        from semsig_gis.core import installed_readers
+        from semsig_gis.sources import READERS, load_catalog
+
+        if self.name is not None:
+            catalog = load_catalog(self.name)
+            return Result(values=partial(asdict, catalog), text=_details(catalog))
+        listed = [load_catalog(name) for name in catalogs()]
+        readers = sorted({*READERS, *installed_readers(reserved=READERS)})
+        return Result(
+            values=lambda: {"catalogs": [*map(_row, listed)], "readers": readers},
+            text=_list(listed, readers),
+        )
+
+
+def _row(catalog: Catalog) -> CatalogRow:
+    live = bool(catalog.endpoints)
+    return {
+        "name": catalog.name,
+        "title": catalog.title,
+        "place": catalog.place,
+        "needs": {"files": not live, "network": live, "area": live, "token": catalog.token},
+        "classes": [item.name for item in catalog.classes],
+        "layers": len(catalog.layers),
+        "reader": catalog.reader,
+        "license": catalog.license,
+    }
+
+
+def _list(listed: list[Catalog], readers: list[str]) -> Iterator[str | Table]:
+    yield Table.of(
+        "Catalogues",
+        ("name", "place", "needs", "classes", "layers", "reader", "licence"),
+        (
+            [
+                c.name,
+                c.place,
+                _needs_text(c),
+                "".join(item.symbol for item in c.classes),
+                len(c.layers),
+                c.reader,
+                c.license,
+            ]
+            for c in listed
+        ),
+    )
+    symbols = {item.symbol: item.name for c in listed for item in c.classes}
+    yield f"classes: {', '.join(f'{symbol} {name}' for symbol, name in symbols.items())}"
+    yield f"readers: {', '.join(readers)}"
+
+
+def _details(catalog: Catalog) -> Iterator[str | Table]:
+    # An exclusion that all layers of objects share is shown once.
+    rules = {spec.exclusions for spec in catalog.layers if spec.role == "objects"}
+    common = rules.pop() if len(rules) == 1 else ()
+    yield Table.of(
+        f"{catalog.title} ({catalog.url})",
+        ("layer", "class", "from", "filter", "licence", "note"),
+        (
+            [
+                f"{spec.name} (optional)" if spec.optional else spec.name,
+                _class_text(spec),
+                _origin_text(spec),
+                _filter_text(spec, common),
+                spec.license,
+                spec.note,
+            ]
+            for spec in catalog.layers
+        ),
+    )
+    yield f"place: {catalog.place or 'not stated'}; needs {_needs_text(catalog)}"
+    if common:
+        yield f"left out of every layer of objects: {', '.join(_rules(common))}"
+    yield Table.of(
+        "Classes",
+        ("symbol", "code", "class", "title"),
+        ([c.symbol, c.code, c.name, c.title] for c in catalog.classes),
+    )
+
+
+def _needs_text(catalog: Catalog) -> str:
+    """Return the inputs that a catalogue needs, as text."""
+    if not catalog.endpoints:
+        return "files"
+    if catalog.token is None:
+        return "files, or an area and the network"
+    state = "set" if os.environ.get(catalog.token) else "not set"
+    return f"files, or an area, the network and a token ({catalog.token}, {state})"
+
+
+def _class_text(spec: LayerSpec) -> str:
+    by = f" (by {spec.class_by.field})" if spec.class_by else ""
+    return f"{', '.join(spec.classes)}{by}" if spec.classes else spec.role
+
+
+def _origin_text(spec: LayerSpec) -> str:
+    """Return the origin of a layer: tags, a dataset of a portal, or files."""
+    if spec.tags:
+        tags = " or ".join(
+            " and ".join(f"{key}={'/'.join(values)}" for key, values in tags) for tags in spec.tags
+        )
+        return tags if spec.dataset is None else f"{spec.dataset}: {tags}"
+    files, dataset = ", ".join(spec.files), spec.dataset or spec.server_where
+    return files if dataset is None else f"{dataset} ({files})"
+
+
+def _filter_text(spec: LayerSpec, common: Rules) -> str:
+    exclusions = spec.exclusions if spec.exclusions != common else ()
+    return " and ".join([*_rules(spec.where), *(f"not {rule}" for rule in _rules(exclusions))])
+
+
+def _rules(rules: Rules) -> list[str]:
+    return [f"{field} = {' or '.join(map(str, accepted))}" for field, accepted in rules]
