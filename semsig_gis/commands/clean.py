@@ -37,9 +37,15 @@ class Clean:
 
     database: Database
     objects: Annotated[
-        bool, Option("Also remove the street objects, which updates and refined places need.")
+        bool,
+        Option(
+            "Also remove the street objects, which updates and refined places need.",
+            title="Also the street objects",
+        ),
     ] = False
-    dry_run: Annotated[bool, Option("List what would be removed, but remove nothing.")] = False
+    dry_run: Annotated[
+        bool, Option("List what would be removed, but remove nothing.", title="Only list the files")
+    ] = False
 
     def run(self, _reporter: Reporter) -> Result:
         """Remove the files; return them."""

@@ -31,8 +31,13 @@ class Demonstrated(TypedDict):
 class Demo:
     """Run every step on a small made-up city, offline."""
 
-    out: Annotated[Path, Option("Folder to write to.", metavar="FOLDER", writes="")] = Path("demo")
-    queries: Annotated[int, Option("Number of queries to ask.", low=1, high=MOST_QUERIES)] = 200
+    out: Annotated[
+        Path, Option("Folder to write to.", title="Folder", metavar="FOLDER", writes="")
+    ] = Path("demo")
+    queries: Annotated[
+        int,
+        Option("Number of queries to ask.", title="Number of queries", low=1, high=MOST_QUERIES),
+    ] = 200
     seed: Annotated[int, Option("Seed of the city and the queries.", low=0, high=MOST_SEED)] = 0
 
     def run(self, reporter: Reporter) -> Result:

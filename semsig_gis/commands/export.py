@@ -40,14 +40,17 @@ class Export:
             ".fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), .tif (one number "
             "per cell) or .json (STAC item).",
             title="File",
-            writes="",
+            writes=(".gpkg", ""),
         ),
     ]
-    objects: Annotated[Path | None, Option("Street objects to add as a layer.", reads=True)] = None
+    objects: Annotated[
+        Path | None, Option("Street objects to add as a layer.", title="Street objects", reads=True)
+    ] = None
     evaluation: Annotated[
         Path | None,
         Option(
             "Folder written by `semsig evaluate --out`, to add its queries.",
+            title="Folder of results",
             metavar="FOLDER",
             reads=True,
         ),
@@ -58,6 +61,7 @@ class Export:
             "Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; by default "
             "cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the default), "
             "identifiability, error, or field (share of the queries around that fail).",
+            title="Layers",
             metavar="NAME",
             suggestions=_layers,
         ),
@@ -68,13 +72,18 @@ class Export:
         Option(
             "Write hexagons of this resolution of H3, such as 9, that sum up cells, objects and "
             "queries.",
+            title="Resolution of hexagons",
             low=0,
             high=15,
         ),
     ] = None
     geometry: Annotated[
         Literal["polygon", "point"] | None,
-        Option("How a cell is drawn.", default="as a polygon, in CSV as a point"),
+        Option(
+            "How a cell is drawn.",
+            title="Shape of a cell",
+            default="as a polygon, in CSV as a point",
+        ),
     ] = None
 
     def run(self, reporter: Reporter) -> Result:

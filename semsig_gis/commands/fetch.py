@@ -20,6 +20,7 @@ class Fetch(LoadOptions):
         str,
         Option(
             "Catalogue with a service, by name or .toml.",
+            title="Catalogue",
             positional=True,
             reads=True,
             suggestions=catalogs,
@@ -35,13 +36,20 @@ class Fetch(LoadOptions):
     ]
     cache: Annotated[
         Path | None,
-        Option("Folder of the cache.", metavar="FOLDER", default="semsig's own", advanced=True),
+        Option(
+            "Folder of the cache.",
+            title="Folder of the cache",
+            metavar="FOLDER",
+            default="semsig's own",
+            advanced=True,
+        ),
     ] = None
-    offline: Annotated[bool, Option("Use the cache only.")] = False
+    offline: Annotated[bool, Option("Use the cache only.", title="Without a network")] = False
     timeout: Annotated[
         float,
         Option(
             "Give up a download after this time, all attempts together.",
+            title="Time limit",
             unit="s",
             low=1,
             high=86_400,

@@ -27,7 +27,13 @@ class Import:
     """Restore a database from an exported GeoPackage."""
 
     geopackage: Annotated[
-        Path, Option("GeoPackage written by `semsig export`.", positional=True, reads=True)
+        Path,
+        Option(
+            "GeoPackage written by `semsig export`.",
+            title="GeoPackage",
+            positional=True,
+            reads=True,
+        ),
     ]
     out: Annotated[
         Path,
@@ -36,7 +42,8 @@ class Import:
         ),
     ]
     objects: Annotated[
-        Path | None, Option("Street objects to write, if exported.", writes=".parquet")
+        Path | None,
+        Option("Street objects to write, if exported.", title="Street objects", writes=".parquet"),
     ] = None
 
     def run(self, reporter: Reporter) -> Result:

@@ -23,7 +23,11 @@ def catalogs() -> tuple[str, ...]:
 
 Crs = Annotated[
     str | None,
-    Option("CRS of files that do not state their own, such as EPSG:2154.", metavar="CRS"),
+    Option(
+        "CRS of files that do not state their own, such as EPSG:2154.",
+        title="CRS of the files",
+        metavar="CRS",
+    ),
 ]
 
 
@@ -76,12 +80,19 @@ class LoadOptions:
     layer: Annotated[
         list[str] | None,
         Option(
-            "Read only this layer, or with +NAME also this one; may be repeated.", metavar="NAME"
+            "Read only this layer, or with +NAME also this one; may be repeated.",
+            title="Layers",
+            metavar="NAME",
         ),
     ] = None
     all_layers: Annotated[bool, Option("Read the optional layers of objects as well.")] = False
     paper_classes: Annotated[
-        bool, Option("Read only the eleven classes of the paper.", advanced=True)
+        bool,
+        Option(
+            "Read only the eleven classes of the paper.",
+            title="Only the classes of the paper",
+            advanced=True,
+        ),
     ] = False
     buildings: Annotated[
         Path | None, Option("Building footprints to write as well (.parquet).", writes=".parquet")
@@ -94,6 +105,7 @@ class LoadOptions:
         str | None,
         Option(
             "CRS in metres to work in.",
+            title="CRS to work in",
             metavar="CRS",
             default="the catalogue's or the UTM zone",
             advanced=True,
@@ -103,18 +115,31 @@ class LoadOptions:
         float,
         Option(
             "Largest distortion allowed for the CRS: degrees of bearings, percent of lengths.",
+            title="Largest distortion of the CRS",
             low=0,
             high=180,
             advanced=True,
         ),
     ] = 6.0
-    filter: Annotated[bool, Option("Apply the catalogue's filters.", advanced=True)] = True
+    filter: Annotated[
+        bool,
+        Option("Apply the catalogue's filters.", title="Filters of the catalogue", advanced=True),
+    ] = True
     collapse: Annotated[
-        bool, Option("Collapse objects of a class at the same place.", advanced=True)
+        bool,
+        Option(
+            "Collapse objects of a class at the same place.",
+            title="Collapse objects of a class",
+            advanced=True,
+        ),
     ] = True
     merge: Annotated[
         bool,
-        Option("Merge objects of different layers within the catalogue's radii.", advanced=True),
+        Option(
+            "Merge objects of different layers within the catalogue's radii.",
+            title="Merge objects of layers",
+            advanced=True,
+        ),
     ] = True
 
     @property
@@ -168,6 +193,7 @@ class Load(LoadOptions):
         Option(
             "Catalogue, by name or .toml file; not needed for OpenStreetMap and Overture. Repeat "
             "to merge several, best first.",
+            title="Catalogues",
             metavar="NAME|FILE",
             reads=True,
             suggestions=catalogs,
@@ -179,6 +205,7 @@ class Load(LoadOptions):
         Option(
             "Keep only what is in this box in degrees, in the polygons of a file, or with 'box' "
             "in the area that OpenStreetMap files state.",
+            title="Area to keep",
             metavar="WEST,SOUTH,EAST,NORTH|FILE|box",
             reads=True,
         ),

@@ -35,9 +35,10 @@ class Map:
     """Draw cells, evaluations, changes, answers or objects on a map."""
 
     database: Database
-    out: Annotated[Path, Option("Map to write (.html).", title="Map", writes=".html")]
+    out: Annotated[Path, Option("Map to write (.html).", title="Map page", writes=".html")]
     objects: Annotated[
-        Path | None, Option("Draw street objects written by `semsig load`.", reads=True)
+        Path | None,
+        Option("Draw street objects written by `semsig load`.", title="Street objects", reads=True),
     ] = None
     ambiguity: Annotated[bool, Option("Draw how many cells look the same.")] = False
     identifiability: Annotated[
@@ -45,15 +46,25 @@ class Map:
     ] = False
     evaluation: Annotated[
         Path | None,
-        Option("Folder written by `semsig evaluate --out`.", metavar="FOLDER", reads=True),
+        Option(
+            "Folder written by `semsig evaluate --out`.",
+            title="Folder of results",
+            metavar="FOLDER",
+            reads=True,
+        ),
     ] = None
     smooth: Smooth = None
     drift: Annotated[
-        Path | None, Option("Draw the changes up to this newer database.", reads=True)
+        Path | None,
+        Option("Draw the changes up to this newer database.", title="Changes", reads=True),
     ] = None
     location: Annotated[
         Path | None,
-        Option("Draw an answer: the .tif file that `semsig localize --out` wrote.", reads=True),
+        Option(
+            "Draw an answer: the .tif file that `semsig localize --out` wrote.",
+            title="Answer",
+            reads=True,
+        ),
     ] = None
     buildings: Annotated[
         Path | None,
@@ -78,6 +89,7 @@ class Map:
         Option(
             "Draw online tiles below the map, of a provider of xyzservices that needs no key, "
             "such as OpenStreetMap.Mapnik.",
+            title="Online tiles",
             metavar="PROVIDER",
             advanced=True,
         ),

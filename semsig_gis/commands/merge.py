@@ -30,13 +30,29 @@ class Merge:
     """
 
     first: Annotated[
-        Path, Option("Signature database in one file or in tiles.", positional=True, reads=True)
+        Path,
+        Option(
+            "Signature database in one file or in tiles.",
+            title="First database",
+            positional=True,
+            reads=True,
+        ),
     ]
     second: Annotated[
         Path,
-        Option("Another signature database, built in the same way.", positional=True, reads=True),
+        Option(
+            "Another signature database, built in the same way.",
+            title="Second database",
+            positional=True,
+            reads=True,
+        ),
     ]
-    out: Annotated[Path, Option("Signature database to write (.parquet).", writes=".parquet")]
+    out: Annotated[
+        Path,
+        Option(
+            "Signature database to write (.parquet).", title="Merged database", writes=".parquet"
+        ),
+    ]
 
     def run(self, reporter: Reporter) -> Result:
         """Write the database; return its counts."""

@@ -46,7 +46,7 @@ class Schema:
         items = commands()
         for name in self.names or ():
             if name not in items:
-                raise UnitemsNameError(
+                raise UnknownNameError(
                     f"there is no command {name!r}{nearest_name(name, items)}; give one of "
                     f"{', '.join(items)}."
                 )

@@ -81,6 +81,7 @@ class Sources:
         str | None,
         Option(
             "Catalogue, by name or .toml file; default: list all.",
+            title="Catalogue",
             positional=True,
             suggestions=catalogs,
         ),

@@ -24,11 +24,12 @@ class Synthesized(TypedDict):
 class Synthesize:
     """Make up a city: street objects, buildings and streets."""
 
-    out: Annotated[Path, Option("Folder to write to.", metavar="FOLDER", writes="")]
+    out: Annotated[Path, Option("Folder to write to.", title="Folder", metavar="FOLDER", writes="")]
     size: Annotated[
         float | None,
         Option(
             "Side of the square city.",
+            title="Side of the city",
             unit="m",
             low=100,
             high=20_000,

@@ -46,15 +46,28 @@ class Update:
     ]
     objects: Annotated[
         Path,
-        Option("New street objects; their layers replace layers of the database.", reads=True),
+        Option(
+            "New street objects; their layers replace layers of the database.",
+            title="New street objects",
+            reads=True,
+        ),
     ]
-    out: Annotated[Path | None, Option("Database to write.", default="in place", writes="")] = None
+    out: Annotated[
+        Path | None,
+        Option(
+            "Database to write.",
+            title="Updated database",
+            default="in place",
+            writes=(".parquet", ""),
+        ),
+    ] = None
     workers: Workers = 0
     scheduler: Scheduler = None
     years: Annotated[
         float | None,
         Option(
             "Years between the old objects and the new ones, for the report of --json.",
+            title="Time between the objects",
             unit="years",
             low=0.001,
             high=100,

@@ -78,6 +78,7 @@ class Views:
         Option(
             "Object detector (.onnx) to run on photographs: YOLO, RT-DETR, DETR or torchvision.  "
             "(needs the extra detect)",
+            title="Object detector",
             reads=True,
         ),
     ] = None
@@ -87,6 +88,7 @@ class Views:
             "Map from labels to classes, by name or .toml file; repeat for several, best first. "
             "With --detector also the names of its classes: coco, or a .txt, .yaml or .json file "
             "(default: from the model).",
+            title="Maps of labels",
             metavar="NAME|FILE",
             default="all built-in maps",
             reads=True,
@@ -106,6 +108,7 @@ class Views:
         Path | None,
         Option(
             "Folder of the pictures, to read focal length and heading from EXIF.",
+            title="Folder of the pictures",
             metavar="FOLDER",
             default="the folder of the files, or the one of images next to it",
         ),
@@ -115,13 +118,14 @@ class Views:
         Option(
             "Camera data of single pictures: a CSV or JSON lines file with image and any of "
             "camera, fov, heading, heading_error, pitch, roll and place.",
+            title="Camera data",
             reads=True,
             advanced=True,
         ),
     ] = None
     camera: Annotated[
         Literal["pinhole", "equirectangular", "cylindrical", "fisheye"] | None,
-        Option("Projection of the pictures.", default="pinhole"),
+        Option("Projection of the pictures.", title="Projection", default="pinhole"),
     ] = None
     fov: Annotated[
         float | None,
@@ -148,6 +152,7 @@ class Views:
         str | None,
         Option(
             "Standard deviation of the heading in degrees, or unknown.",
+            title="Error of the heading",
             metavar="DEGREES|unknown",
             default="10 from EXIF; otherwise left to semsig localize",
             advanced=True,
@@ -171,6 +176,7 @@ class Views:
         str | None,
         Option(
             "Size of pictures where it is unknown, such as 1920x1080.",
+            title="Size of the pictures",
             metavar="WIDTHxHEIGHT",
             advanced=True,
         ),
@@ -183,7 +189,9 @@ class Views:
             title="Pictures of one place",
         ),
     ] = "each"
-    min_score: Annotated[float, Option("Leave out boxes with a lower score.", low=0, high=1)] = 0.3
+    min_score: Annotated[
+        float, Option("Leave out boxes with a lower score.", title="Lowest score", low=0, high=1)
+    ] = 0.3
 
     def run(self, reporter: Reporter) -> Result:
         """Write the views; return their counts."""
