@@ -18,7 +18,7 @@ from gallery import write_gallery
 from PIL import Image
 
 import semsig_gis
-from semsig_gis.cli.commands import app as semsig
+from semsig_gis.cli.app import app as semsig
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -1,4 +1,4 @@
-"""The `semsig` command: each module parses options, calls the library and prints the results.
+"""The `semsig` command: parse the arguments of a command, run it and print its result.
 
 Results go to standard output, progress and remarks to standard error. Exit codes: 0 for success,
 2 for input or a machine that cannot be used (with one plain sentence), 1 for a bug of this
@@ -97,8 +97,8 @@ def _run() -> int:
         with contextlib.suppress(AttributeError):  # a stream replaced by another program
             stream.reconfigure(errors="backslashreplace")  # type: ignore[attr-defined]
     _check_surroundings()
+    from semsig_gis.cli.app import run
     from semsig_gis.cli.console import stop_with_supervisor, supervised
-    from semsig_gis.cli.run import run
 
     if supervised():
         stop_with_supervisor()

@@ -1,63 +1,137 @@
-"""The typer application, made from the commands, and the printing of their results."""
+"""The typer application, made from the commands: parse the arguments, run, print the result."""
 
 from __future__ import annotations
 
 import inspect
+import sys
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from semsig_gis.cli.console import REPORTER, app, print_json, print_table, remark, say, talk
-from semsig_gis.commands import Command, Field, Result, commands, run_command
+from semsig_gis import __version__
+from semsig_gis.cli import console
+from semsig_gis.cli.console import REPORTER, print_json, print_table, remark, say, talk
+from semsig_gis.commands import GROUPS, Command, Field, Result, commands, run_command
 from semsig_gis.core import InputError
+
+INTERRUPTED = 130
+ABOUT = "Find where in a city a view was taken, from the street objects in it."
+PLAIN: dict[str, Any] = {"pretty_exceptions_enable": False, "rich_markup_mode": None}
+SHOW_ALL = "semsig_gis.show_all"
 
 
 def _show_all(context: typer.Context, value: bool) -> None:  # noqa: FBT001 - typer calls it so
     """Print the help with the advanced options."""
     if value:
-        for parameter in context.command.params:
-            parameter.hidden = False  # type: ignore[attr-defined]
+        context.meta[SHOW_ALL] = True
         say(context.get_help())
         raise typer.Exit
 
 
 SHARED = {
-    "as_json": (typer.Option("--json", help="Print JSON instead of tables."), False),
-    "quiet": (
-        typer.Option("--quiet", "-q", help="Print results only, without progress and remarks."),
-        False,
+    "as_json": typer.Option("--json", help="Print JSON instead of tables."),
+    "quiet": typer.Option(
+        "--quiet", "-q", help="Print results only, without progress and remarks."
     ),
-    "verbose": (
-        typer.Option("--verbose", "-v", help="Report each step and how long it took."),
-        False,
-    ),
-    "help_all": (
-        typer.Option(
-            "--help-all", is_eager=True, callback=_show_all, help="Show all options and exit."
-        ),
-        False,
+    "verbose": typer.Option("--verbose", "-v", help="Report each step and how long it took."),
+    "help_all": typer.Option(
+        "--help-all", is_eager=True, callback=_show_all, help="Show all options and exit."
     ),
 }
 """Options of the command line that are not fields of a request."""
 
 
-def register(command: Command) -> None:
-    """Add a command to the application."""
-    shared = ["quiet", "verbose"]
-    if command.returns is not None:
-        shared.insert(0, "as_json")
-    if any(field.option.advanced for field in command.fields):
-        shared.append("help_all")
-    parameters = [_parameter(field) for field in command.fields]
-    parameters += [
-        inspect.Parameter(
-            name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=SHARED[name][1],
-            annotation=Annotated[bool, SHARED[name][0]],
-        )
-        for name in shared
-    ]
+class _Command(TyperCommand):
+    """A command whose help has the usual options, and words for values instead of types."""
+
+    fields: Mapping[str, Field]
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - of typer
+        sections: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
+        for parameter in self.get_params(ctx):
+            names, text = parameter.get_help_record(ctx) or ("", "")
+            field = self.fields.get(parameter.name)
+            if field is not None:
+                if field.option.advanced and SHOW_ALL not in ctx.meta:
+                    continue
+                details = "; ".join(field.details)
+                text = f"{field.option.help}  [{details}]" if details else field.option.help
+            positional = field is not None and field.option.positional
+            heading = "Arguments" if positional else "Options"
+            sections[heading].append((names.partition(" <")[0], text))
+        for heading, rows in sections.items():
+            if rows:
+                with formatter.section(heading):
+                    formatter.write_dl(rows)
+
+
+class _Commands(Mapping[str, Any]):
+    """The commands as typer's, made when they are looked up."""
+
+    def __init__(self) -> None:
+        import semsig_gis.cli.commands  # noqa: F401 - those that are not made from `commands`
+
+        self.parsed = dict(typer.main.get_command(console.app).commands)  # type: ignore[attr-defined]
+
+    def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - of typer
+        if name not in self.parsed:
+            self.parsed[name] = _typer_command(commands()[name])
+        return self.parsed[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict.fromkeys([*commands(), *self.parsed]))
+
+    def __len__(self) -> int:
+        return len(dict.fromkeys([*commands(), *self.parsed]))
+
+
+class _Group(TyperGroup):
+    """All commands; the help lists them by group."""
+
+    def __init__(self, **options: Any) -> None:  # noqa: ANN401 - of typer
+        super().__init__(**options)
+        self.commands = _Commands()  # type: ignore[assignment]
+
+    def list_commands(self, _ctx: object) -> list[str]:
+        return [*self.commands]
+
+    def format_commands(self, _ctx: object, formatter: Any) -> None:  # noqa: ANN401 - of typer
+        items = commands().values()
+        width = max(len(item.name) for item in items)
+        for group in GROUPS:
+            rows = [
+                (item.name.ljust(width), item.help.partition("\n")[0])
+                for item in items
+                if item.group == group
+            ]
+            if rows:
+                with formatter.section(group):
+                    formatter.write_dl(rows)
+
+
+app = typer.Typer(name="semsig", cls=_Group, help=ABOUT, **PLAIN)
+
+
+def _version(value: bool) -> None:  # noqa: FBT001 - typer calls it so
+    if value:
+        say(f"semsig {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    *,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+def _typer_command(command: Command) -> Any:  # noqa: ANN401 - of typer
+    """Return a command as typer's."""
 
     def run(
         *,
@@ -75,20 +149,40 @@ def register(command: Command) -> None:
         finally:
             talk.reset(before)
 
+    shared = set(SHARED)
+    if command.returns is None:
+        shared.remove("as_json")
+    if not any(field.option.advanced for field in command.fields):
+        shared.remove("help_all")
+    parameters = [
+        *map(_parameter, command.fields),
+        *(
+            inspect.Parameter(
+                name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=False,
+                annotation=Annotated[bool, option],
+            )
+            for name, option in SHARED.items()
+            if name in shared
+        ),
+    ]
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    typer.Typer.command(app, command.name, help=command.help)(run)
+    single = typer.Typer(add_completion=False, **PLAIN)
+    single.command(command.name, cls=_Command, help=command.help)(run)
+    parsed: Any = typer.main.get_command(single)
+    parsed.fields = {field.name: field for field in command.fields}
+    return parsed
 
 
 def _parameter(field: Field) -> inspect.Parameter:
     """Return a field as a parameter that typer reads."""
     option = field.option
-    text = option.help + (f"  [default: {option.default}]" if option.default else "")
+    whole = field.kind is int
     about: dict[str, Any] = {
-        "help": text,
-        "metavar": None if field.kind is bool else field.metavar,
-        "min": option.low,
-        "max": option.high,
-        "show_default": not option.default,
+        "metavar": option.metavar or None if option.positional else field.metavar,
+        "min": int(option.low) if whole and option.low is not None else option.low,
+        "max": int(option.high) if whole and option.high is not None else option.high,
     }
     if (suggestions := option.suggestions) is not None:
 
@@ -96,18 +190,15 @@ def _parameter(field: Field) -> inspect.Parameter:
             return [name for name in suggestions() if name.startswith(incomplete)]
 
         about["autocompletion"] = complete
-    if field.kind is int:
-        about |= {
-            name: None if about[name] is None else int(about[name]) for name in ("min", "max")
-        }
     if option.positional:
-        about["metavar"] = option.metavar or None
         parameter = typer.Argument(**about)
     else:
         names = [field.flag, option.short] if option.short else [field.flag]
-        if field.kind is bool and (field.optional or field.default):
-            names[0] += f"/{field.flag.replace('--', '--no-', 1)}"
-        parameter = typer.Option(*names, hidden=option.advanced, **about)
+        if field.kind is bool:
+            about["metavar"] = None
+            if field.optional or field.default:
+                names[0] += f"/{field.flag.replace('--', '--no-', 1)}"
+        parameter = typer.Option(*names, **about)
     return inspect.Parameter(
         field.name,
         inspect.Parameter.KEYWORD_ONLY,
@@ -133,5 +224,36 @@ def show(result: Result, *, as_json: bool) -> None:
         remark(note)
 
 
-for _command in commands().values():
-    register(_command)
+def run() -> int:
+    """Run the command that the arguments name, and return its exit code.
+
+    Raises InputError for an unknown command or an invalid value of an option.
+    """
+    arguments = None if sys.argv[1:] else ["--help"]
+    try:
+        code = app(arguments, prog_name="semsig", standalone_mode=False)
+    except typer.TyperException as error:
+        context = getattr(error, "ctx", None)
+        command = "semsig" if context is None else context.command_path
+        fault = error.format_message().rstrip(".?").replace(". ", "; ")
+        raise InputError(_out_of_range(error) or f"{fault}; see {command} --help.") from error
+    except SystemExit as end:
+        if end.code:  # typer exits so if the reader has closed the output
+            raise BrokenPipeError from end
+        return 0  # shell completion
+    if code == INTERRUPTED:  # typer returns it after the interrupt key
+        raise KeyboardInterrupt
+    return code if isinstance(code, int) else 0
+
+
+def _out_of_range(error: typer.TyperException) -> str:
+    """Return the message for an option value out of range; an empty text for other errors."""
+    option: Any = getattr(error, "param", None)
+    least, most = getattr(option, "min", None), getattr(option, "max", None)
+    faults: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()  # of pydantic
+    if not faults or least is None or most is None:
+        return ""
+    kind, value = faults[0]["type"], faults[0]["input"]
+    number = "a whole number" if kind.startswith("int") else "a number"
+    shown = repr(value) if kind.endswith("parsing") else value
+    return f"{option.opts[0]} was given as {shown}; give {number} from {least:,} to {most:,}."

@@ -1,10 +1,7 @@
-"""All commands, registered by the imports below in the order of the help."""
-
-from semsig_gis.cli.console import app
+"""Commands that are not made from the registry of `commands`, registered by these imports."""
 
 # isort: off
 from semsig_gis.cli import (  # noqa: F401
-    app as made,
     localize,
     route,
     suggest,
@@ -13,5 +10,3 @@ from semsig_gis.cli import (  # noqa: F401
     evaluate,
     benchmark,
 )
-
-__all__ = ["app"]

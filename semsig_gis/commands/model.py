@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import importlib
 import inspect
 import os
@@ -179,6 +180,18 @@ class Field:
             return METAVARS.get(option.unit, "NUMBER")
         return "TEXT"
 
+    @property
+    def details(self) -> list[str]:
+        """The default, the range, and whether the value is required, for the help."""
+        option = self.option
+        default = option.default
+        if not default and self.default not in {None, False, ""}:
+            default = self.flag if self.kind is bool else _text(self.default)
+        details = [f"default: {default}"] if default else []
+        if option.low is not None and option.high is not None:
+            details.append(f"from {option.low:,} to {option.high:,}")
+        return [*details, "required"] if self.required else details
+
     def words(self, value: Any) -> list[str]:  # noqa: ANN401 - as many types as fields
         """Return a value as words of a command line; none for the default."""
         if value == self.default or value is None:
@@ -292,14 +305,20 @@ def commands() -> Mapping[str, Command]:
     Those of other packages are classes in the entry points ``semsig_gis.commands``, which
     `command` decorates.
     """
-    package = importlib.import_module("semsig_gis.commands")
-    for module in pkgutil.iter_modules(package.__path__):
-        importlib.import_module(f"{package.__name__}.{module.name}")
-    installed_commands(reserved=_COMMANDS)
+    _import_commands()
     ordered = sorted(
         _COMMANDS.values(), key=lambda item: (GROUPS.index(item.group), item.order, item.name)
     )
     return {item.name: item for item in ordered}
+
+
+@functools.cache
+def _import_commands() -> None:
+    """Import the modules that register commands, here and in other packages."""
+    package = importlib.import_module("semsig_gis.commands")
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{package.__name__}.{module.name}")
+    installed_commands(reserved=tuple(_COMMANDS))
 
 
 def run_command(request: Any, reporter: Reporter = SILENT) -> Result:  # noqa: ANN401 - any request

@@ -81,7 +81,7 @@ def test_each_kind_of_error_has_an_exit_code(
 CALLBACK = """
 import ctypes, signal, sys, time
 from semsig_gis import cli
-from semsig_gis.cli import run as command
+from semsig_gis.cli import app as command
 
 @ctypes.CFUNCTYPE(None)
 def callback():
@@ -124,7 +124,7 @@ def outcome(code: str) -> tuple[int, str]:
 AT_EXIT = """
 import atexit, signal
 from semsig_gis import cli
-from semsig_gis.cli import run as command
+from semsig_gis.cli import app as command
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 atexit.register(signal.raise_signal, signal.SIGINT)  # during the clean-up of Python

@@ -9,7 +9,7 @@ import pytest
 import typer
 from sentences import refused, sentence
 
-from semsig_gis.cli.commands import app
+from semsig_gis.cli.app import app
 from semsig_gis.core import (
     MOST_METRES,
     MOST_SEED,

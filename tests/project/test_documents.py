@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.main import get_group
 
-from semsig_gis.cli.commands import app
+from semsig_gis.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 # Sphinx checks the links of the other pages.

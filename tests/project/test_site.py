@@ -22,7 +22,7 @@ from axe_core_python.selenium import Axe
 from typer.main import get_group
 
 import semsig_gis
-from semsig_gis.cli.commands import app
+from semsig_gis.cli.app import app
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome

@@ -28,7 +28,7 @@ from semsig.command import (
 )
 from sentences import refused
 
-from semsig_gis.cli.commands import app
+from semsig_gis.cli.app import app
 from semsig_gis.cli.console import VARIABLE
 from semsig_gis.core import DEFAULT_METHOD
 from semsig_gis.evaluation import parse_chain
