@@ -44,7 +44,7 @@ SHARED = {
 
 
 class _Command(TyperCommand):
-    """A command whose help has the usual options, and words for values instead of types."""
+    """A command: its help has the usual options, and words for values instead of types."""
 
     fields: Mapping[str, Field]
 

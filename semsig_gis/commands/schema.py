@@ -16,7 +16,7 @@ from semsig_gis.commands.model import (
     command,
     commands,
 )
-from semsig_gis.core import nearest_name
+from semsig_gis.core import UnknownNameError, nearest_name
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 TYPES = {bool: "boolean", int: "integer", float: "number", str: "string", Path: "string"}
