@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from semsig_gis.commands.info import Info
+from semsig_gis.commands.info import Info, Properties
 from semsig_gis.commands.model import Option, Reporter, Result, command
 from semsig_gis.commands.options import MOST_METRES, Scheduler, Workers, numbers
 from semsig_gis.core import InputError
@@ -19,13 +19,7 @@ if TYPE_CHECKING:
     from semsig_gis.objects import StreetObjects
 
 
-@command(
-    "build",
-    title="Build signature database",
-    group="Databases",
-    order=1,
-    returns=dict[str, Any],
-)
+@command("build", title="Build signature database", group="Databases", order=1, returns=Properties)
 @dataclass(frozen=True, kw_only=True)
 class Build:
     """Build a signature database from street objects.

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NotRequired
 
+from typing_extensions import TypedDict
+
+from semsig_gis import database as databases
 from semsig_gis.commands.model import Reporter, Result, command
 from semsig_gis.commands.options import Database, known_identifiability
 from semsig_gis.core import Table
@@ -15,9 +18,73 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import Identifiability
 
 
-@command(
-    "info", title="Properties of a database", group="Databases", order=4, returns=dict[str, Any]
-)
+class ClassProperties(TypedDict):
+    """How often a class is seen; `objects` is None if they are not known."""
+
+    code: int
+    symbol: str
+    name: str
+    title: str
+    range_m: float
+    number: int
+    share: float
+    objects: int | None
+    objects_per_km2: float
+    entropy_bits: float
+
+
+class Groups(TypedDict):
+    """Statistics of the groups of cells with equal types, angles or both."""
+
+    type: dict[str, float | None]
+    angle: dict[str, float | None]
+    both: dict[str, float | None]
+
+
+class Viewpoints(TypedDict):
+    """Where the viewpoints are."""
+
+    mode: str
+    half_width_m: float | None
+    area_km2: float | None
+
+
+class TypeGroup(TypedDict):
+    """The types that most cells share, and their number."""
+
+    types: str
+    cells: int
+
+
+class Properties(TypedDict):
+    """The properties of a database, of `semsig identify`, and the files next to it."""
+
+    signatures: int
+    mean_length: float
+    covered_km2: float
+    radius_m: float
+    step_m: float
+    levels: int
+    crs: str
+    extent_degrees: list[float]
+    distortion: dict[str, Any]
+    file_mb: float | None
+    mb_per_km2: float | None
+    version: str
+    licenses: list[str]
+    notes: list[str]
+    viewpoints: Viewpoints
+    occlusion_m: float | None
+    occurrences: list[ClassProperties]
+    density_from: str
+    cell_bits: float
+    groups: Groups
+    largest_type_group: TypeGroup
+    identifiability: NotRequired[dict[str, Any]]
+    beside: list[databases.Companion]
+
+
+@command("info", title="Properties of a database", group="Databases", order=4, returns=Properties)
 @dataclass(frozen=True, kw_only=True)
 class Info:
     """Print the properties of a database next to those in the paper."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from typing_extensions import TypedDict
+
 from semsig_gis.commands.model import (
     Command,
     Field,
@@ -22,7 +24,10 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 TYPES = {bool: "boolean", int: "integer", float: "number", str: "string", Path: "string"}
 
 
-@command("schema", title="Schema of the commands", group="Results", order=9, returns=dict[str, Any])
+Schemas = TypedDict("Schemas", {"$schema": str, "commands": dict[str, dict[str, Any]]})
+
+
+@command("schema", title="Schema of the commands", group="Results", order=9, returns=Schemas)
 @dataclass(frozen=True, kw_only=True)
 class Schema:
     """Print the JSON Schema of the requests and results of all commands, or of some.
@@ -88,6 +93,9 @@ def result_schema(item: Command) -> dict[str, Any] | None:
 
         def typed_dict_schema(self, schema: Any) -> dict[str, Any]:  # noqa: ANN401 - of pydantic
             return {"additionalProperties": False, **super().typed_dict_schema(schema)}
+
+        def dataclass_schema(self, schema: Any) -> dict[str, Any]:  # noqa: ANN401 - of pydantic
+            return {"additionalProperties": False, **super().dataclass_schema(schema)}
 
     returns = item.returns() if inspect.isfunction(item.returns) else item.returns
     schema = TypeAdapter(returns).json_schema(mode="serialization", schema_generator=Closed)
