@@ -14,7 +14,7 @@ from semsig_gis import __version__
 from semsig_gis.cli import console
 from semsig_gis.cli.console import REPORTER, print_json, print_table, remark, say, talk
 from semsig_gis.commands import GROUPS, Command, Field, Result, commands, run_command
-from semsig_gis.core import InputError
+from semsig_gis.core import InputError, installed_command_names
 
 INTERRUPTED = 130
 ABOUT = "Find where in a city a view was taken, from the street objects in it."
@@ -61,10 +61,7 @@ class _Command(TyperCommand):
             positional = field is not None and field.option.positional
             heading = "Arguments" if positional else "Options"
             sections[heading].append((names.partition(" <")[0], text))
-        for heading, rows in sections.items():
-            if rows:
-                with formatter.section(heading):
-                    formatter.write_dl(rows)
+        _write_sections(formatter, sections)
 
 
 class _Commands(Mapping[str, Any]):
@@ -77,14 +74,16 @@ class _Commands(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - of typer
         if name not in self.parsed:
-            self.parsed[name] = _typer_command(commands()[name])
+            here = commands(installed=False)
+            self.parsed[name] = _typer_command(here[name] if name in here else commands()[name])
         return self.parsed[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys([*commands(), *self.parsed]))
+        names = [*commands(installed=False), *self.parsed, *installed_command_names()]
+        return iter(dict.fromkeys(names))
 
     def __len__(self) -> int:
-        return len(dict.fromkeys([*commands(), *self.parsed]))
+        return sum(1 for _ in self)
 
 
 class _Group(TyperGroup):
@@ -98,17 +97,25 @@ class _Group(TyperGroup):
         return [*self.commands]
 
     def format_commands(self, _ctx: object, formatter: Any) -> None:  # noqa: ANN401 - of typer
-        items = commands().values()
-        width = max(len(item.name) for item in items)
-        for group in GROUPS:
-            rows = [
-                (item.name.ljust(width), item.help.partition("\n")[0])
-                for item in items
-                if item.group == group
-            ]
-            if rows:
-                with formatter.section(group):
-                    formatter.write_dl(rows)
+        here = commands(installed=False)
+        width = max(map(len, self.commands))
+        sections: dict[str, list[tuple[str, str]]] = {group: [] for group in GROUPS}
+        for item in here.values():
+            sections[item.group].append((item.name.ljust(width), item.help.partition("\n")[0]))
+        sections["Other packages"] = [
+            (name.ljust(width), f"Command of {package}.")
+            for name, package in installed_command_names().items()
+            if name not in here
+        ]
+        _write_sections(formatter, sections)
+
+
+def _write_sections(formatter: Any, sections: Mapping[str, list[tuple[str, str]]]) -> None:  # noqa: ANN401
+    """Write the sections of a help that are not empty."""
+    for heading, rows in sections.items():
+        if rows:
+            with formatter.section(heading):
+                formatter.write_dl(rows)
 
 
 app = typer.Typer(name="semsig", cls=_Group, help=ABOUT, **PLAIN)

@@ -299,13 +299,15 @@ def command(
     return register
 
 
-def commands() -> Mapping[str, Command]:
+def commands(*, installed: bool = True) -> Mapping[str, Command]:
     """Return all commands by name, in the order of their groups.
 
     Those of other packages are classes in the entry points ``semsig_gis.commands``, which
-    `command` decorates.
+    `command` decorates; they are imported only if `installed`.
     """
     _import_commands()
+    if installed:
+        _import_installed_commands()
     ordered = sorted(
         _COMMANDS.values(), key=lambda item: (GROUPS.index(item.group), item.order, item.name)
     )
@@ -314,10 +316,13 @@ def commands() -> Mapping[str, Command]:
 
 @functools.cache
 def _import_commands() -> None:
-    """Import the modules that register commands, here and in other packages."""
     package = importlib.import_module("semsig_gis.commands")
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
+
+
+@functools.cache
+def _import_installed_commands() -> None:
     installed_commands(reserved=tuple(_COMMANDS))
 
 

@@ -59,8 +59,10 @@ from .parallel import check_workers as check_workers
 from .parallel import finish_tasks as finish_tasks
 from .parallel import run_tasks as run_tasks
 from .plugins import CATALOGS as CATALOGS
+from .plugins import COMMANDS as COMMANDS
 from .plugins import READERS as READERS
 from .plugins import installed_catalogs as installed_catalogs
+from .plugins import installed_command_names as installed_command_names
 from .plugins import installed_commands as installed_commands
 from .plugins import installed_readers as installed_readers
 from .presentation import map_with as map_with

@@ -1,4 +1,4 @@
-"""Catalogues and readers of other installed packages, found by their entry points.
+"""Catalogues, readers and commands of other installed packages, found by their entry points.
 
 ``data_sources/README.md`` shows how a package declares them. Its code is imported only when one
 of the functions below is called.
@@ -10,7 +10,6 @@ import os
 import sys
 import warnings
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +42,11 @@ def installed_readers(*, reserved: Collection[str] = ()) -> Mapping[str, Callabl
     a function is skipped with a warning.
     """
     return _installed(READERS, _function, reserved, SourceError)
+
+
+def installed_command_names() -> Mapping[str, str]:
+    """Return the names of other packages' commands with their packages, without importing them."""
+    return {entry.name: _package(entry) for entry in _entries(COMMANDS, tuple(sys.path))}
 
 
 def installed_commands(*, reserved: Collection[str] = ()) -> Mapping[str, Callable[..., Any]]:
@@ -88,6 +92,8 @@ def _installed(
 @cache  # finding them reads the metadata of all installed packages
 def _entries(group: str, _path: tuple[str, ...]) -> list[EntryPoint]:
     """Return the entries of a group, for one state of ``sys.path``."""
+    from importlib.metadata import entry_points  # noqa: PLC0415 - slow, and rarely needed
+
     return sorted(entry_points(group=group), key=lambda entry: (entry.name, _package(entry)))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -17,10 +18,13 @@ from sentences import refused
 
 from semsig_gis.core import (
     CATALOGS,
+    COMMANDS,
     READERS,
     CatalogError,
+    InputError,
     SourceError,
     installed_catalogs,
+    installed_commands,
     installed_readers,
 )
 from semsig_gis.objects import open_objects
@@ -44,14 +48,14 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target
 
 
-def test_installed_package_is_listed_and_used(installed: Path, tmp_path: Path) -> None:
-    data, out = tmp_path / "town.benches", tmp_path / "objects.parquet"
-    data.write_text("a7 770000 6280000\nb8 770020 6280000\n", encoding="utf-8")
+@pytest.fixture
+def python(installed: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Return a function that runs Python with the package."""
     paths = [str(installed), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
 
-    def semsig(*arguments: str) -> subprocess.CompletedProcess[str]:
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, "-m", "semsig_gis.cli", *arguments, "--json"],
+            [sys.executable, *map(str, arguments)],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
             check=True,
             capture_output=True,
@@ -59,7 +63,23 @@ def test_installed_package_is_listed_and_used(installed: Path, tmp_path: Path) -
             encoding="utf-8",
         )
 
-    shown = semsig("sources")
+    return run
+
+
+@pytest.fixture
+def benches(tmp_path: Path) -> Path:
+    path = tmp_path / "town.benches"
+    path.write_text("a7 770000 6280000\nb8 770020 6280000\n", encoding="utf-8")
+    return path
+
+
+SEMSIG = "-m", "semsig_gis.cli"
+
+
+def test_installed_package_is_listed_and_used(
+    python: Callable[..., subprocess.CompletedProcess[str]], benches: Path, tmp_path: Path
+) -> None:
+    shown = python(*SEMSIG, "sources", "--json")
     listed = json.loads(shown.stdout)
     # Other installed packages do not matter.
     catalogs = {item["name"]: item["title"] for item in listed["catalogs"]}
@@ -70,9 +90,34 @@ def test_installed_package_is_listed_and_used(installed: Path, tmp_path: Path) -
         assert f"semsig: '{name}' of {group}" in shown.stderr
     assert "Traceback" not in shown.stderr
     assert ".py:" not in shown.stderr
-    loaded = semsig("load", str(data), "--catalog", "testville_again", "--out", str(out))
+    out = tmp_path / "objects.parquet"
+    options = "--catalog", "testville_again", "--out", out, "--json"
+    loaded = python(*SEMSIG, "load", benches, *options)
     assert json.loads(loaded.stdout)["objects"] == 2
     assert open_objects(out).table["source_id"].tolist() == ["a7", "b8"]
+
+
+HELP = """
+import sys
+sys.argv = ["semsig", "--help"]
+from semsig_gis.cli import main
+try: main()
+except SystemExit: pass
+print("semsig_testville" in sys.modules)
+"""
+
+
+def test_installed_command_is_listed_and_runs_and_is_imported_only_then(
+    python: Callable[..., subprocess.CompletedProcess[str]], benches: Path
+) -> None:
+    out = python("-c", HELP).stdout
+    assert re.search(r"^ +count-benches +Command of semsig-testville\.$", out, re.MULTILINE)
+    assert out.endswith("\nFalse\n")
+    assert python(*SEMSIG, "count-benches", benches).stdout == "2\n"
+    assert "Count the benches" in python(*SEMSIG, "count-benches", "--help").stdout
+    schema = json.loads(python(*SEMSIG, "schema").stdout)["commands"]
+    assert schema["count-benches"]["request"]["required"] == ["file"]
+    assert schema["info"]["title"] == "Properties of a database"
 
 
 # --- Entries without a package around them ----------------------------------------------------
@@ -161,9 +206,12 @@ def test_reserved_name_is_refused(install: Callable[..., None]) -> None:
         ("north", CATALOGS, "city"),
         ("south", CATALOGS, "city"),
         ("east", READERS, "osm_file"),
+        ("west", COMMANDS, "info"),
     ):
         install(package, group, "raise AssertionError", **{name: "value"})
     with refused(CatalogError, "'city'", "by north and by south", "uninstall"):
         installed_catalogs()
     with refused(SourceError, "'osm_file'", "semsig_gis itself", "by east"):
         installed_readers(reserved=["osm_file"])
+    with refused(InputError, "'info'", "semsig_gis itself", "by west"):
+        installed_commands(reserved=["info"])
