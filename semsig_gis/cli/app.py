@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import typer
@@ -13,7 +14,16 @@ from typer.core import TyperCommand, TyperGroup
 from semsig_gis import __version__
 from semsig_gis.cli import console
 from semsig_gis.cli.console import REPORTER, print_json, print_table, remark, say, talk
-from semsig_gis.commands import GROUPS, Command, Field, Result, commands, run_command
+from semsig_gis.commands import (
+    GROUPS,
+    Command,
+    Field,
+    Option,
+    Result,
+    commands,
+    fields_of,
+    run_command,
+)
 from semsig_gis.core import InputError, installed_command_names
 
 INTERRUPTED = 130
@@ -30,17 +40,26 @@ def _show_all(context: typer.Context, value: bool) -> None:  # noqa: FBT001 - ty
         raise typer.Exit
 
 
-SHARED = {
-    "as_json": typer.Option("--json", help="Print JSON instead of tables."),
-    "quiet": typer.Option(
-        "--quiet", "-q", help="Print results only, without progress and remarks."
-    ),
-    "verbose": typer.Option("--verbose", "-v", help="Report each step and how long it took."),
-    "help_all": typer.Option(
-        "--help-all", is_eager=True, callback=_show_all, help="Show all options and exit."
-    ),
-}
-"""Options of the command line that are not fields of a request."""
+HELP_ALL = typer.Option(
+    "--help-all", is_eager=True, callback=_show_all, help="Show all options and exit."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Printing:
+    """Options of the command line that are not fields of a request."""
+
+    json: Annotated[bool, Option("Print JSON instead of tables.")] = False
+    quiet: Annotated[
+        bool, Option("Print results only, without progress and remarks.", short="-q")
+    ] = False
+    verbose: Annotated[bool, Option("Report each step and how long it took.", short="-v")] = False
+
+
+def printing_of(command: Command) -> list[Field]:
+    """Return the options of a command for what is printed: --json only if it has values."""
+    fields = fields_of(Printing)
+    return [field for field in fields if command.returns is not None or field.name != "json"]
 
 
 class _Command(TyperCommand):
@@ -140,45 +159,33 @@ def _common(
 def _typer_command(command: Command) -> Any:  # noqa: ANN401 - of typer
     """Return a command as typer's."""
 
-    def run(
-        *,
-        quiet: bool,
-        verbose: bool,
-        as_json: bool = False,
-        help_all: bool = False,  # noqa: ARG001 - its callback prints
-        **values: Any,  # noqa: ANN401 - any fields
-    ) -> None:
-        if quiet and verbose:
+    def run(**values: Any) -> None:  # noqa: ANN401 - any fields
+        values.pop("help_all", None)  # its callback prints
+        printing = Printing(**{field.name: values.pop(field.name) for field in shared})
+        if printing.quiet and printing.verbose:
             raise InputError("--quiet and --verbose were given; give one of them.")
-        before = talk.set("quiet" if quiet else "verbose" if verbose else "plain")
+        before = talk.set("quiet" if printing.quiet else "verbose" if printing.verbose else "plain")
         try:
-            show(run_command(command.request(**values), REPORTER), as_json=as_json)
+            show(run_command(command.request(**values), REPORTER), as_json=printing.json)
         finally:
             talk.reset(before)
 
-    shared = set(SHARED)
-    if command.returns is None:
-        shared.remove("as_json")
-    if not any(field.option.advanced for field in command.fields):
-        shared.remove("help_all")
-    parameters = [
-        *map(_parameter, command.fields),
-        *(
-            inspect.Parameter(
-                name,
-                inspect.Parameter.KEYWORD_ONLY,
-                default=False,
-                annotation=Annotated[bool, option],
-            )
-            for name, option in SHARED.items()
-            if name in shared
-        ),
-    ]
+    shared = printing_of(command)
+    fields = [*command.fields, *shared]
+    parameters = [*map(_parameter, fields)]
+    if any(field.option.advanced for field in fields):
+        help_all = inspect.Parameter(
+            "help_all",
+            inspect.Parameter.KEYWORD_ONLY,
+            default=False,
+            annotation=Annotated[bool, HELP_ALL],
+        )
+        parameters.append(help_all)
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     single = typer.Typer(add_completion=False, **PLAIN)
     single.command(command.name, cls=_Command, help=command.help)(run)
     parsed: Any = typer.main.get_command(single)
-    parsed.fields = {field.name: field for field in command.fields}
+    parsed.fields = {field.name: field for field in fields}
     return parsed
 
 
