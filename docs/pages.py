@@ -5,29 +5,31 @@ from __future__ import annotations
 import ast
 import importlib
 import inspect
+import itertools
 import re
 import shutil
 from collections import defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
 from docutils import nodes
 from drawings import write_drawings
 from gallery import write_gallery
 from PIL import Image
 
 import semsig_gis
-from semsig_gis.cli.app import app as semsig
+from semsig_gis.cli.app import printing_of
+from semsig_gis.commands import commands
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from sphinx.application import Sphinx
 
+    from semsig_gis.commands import Command, Field
+
 ROOT = Path(__file__).resolve().parents[1]
 WRITTEN = ("api", "commands", "notebooks")
-NOTES = re.compile(r"\s*\[([^\[\]]+)\]$")
 # Labels and keyboard focus that the theme lacks, for readers who use no screen or no mouse.
 LABELS = {
     '<aside class="sidebar-drawer">': '<aside class="sidebar-drawer" aria-label="Site">',
@@ -49,10 +51,11 @@ UNSEEN = {
     ),
     ".css": re.compile(r"^div\.highlight \.-Color.*?\}\n", re.MULTILINE | re.DOTALL),
 }
-RANGE = re.compile(r"(\S+)<=x<=(\S+)")
+HELP = "Show the usual options; `--help-all` shows all."
 COMMANDS = """# Commands
 
-Every step is one command. `semsig COMMAND --help` prints what these pages say.
+Every step is one command. `semsig COMMAND --help` prints its usual options and `--help-all` all
+options. `semsig schema` prints the same for programs: the JSON Schema of the options and results.
 """
 API = """# Python names
 
@@ -151,40 +154,52 @@ def listed(head: str, entries: Mapping[str, tuple[str, str]]) -> str:
 
 def command_pages() -> Iterable[tuple[str, str]]:
     """Yield the name and the text of the page of every command, and of their list."""
-    group: Any = typer.main.get_command(semsig)
-    lines = {name: command.help.partition("\n")[0] for name, command in group.commands.items()}
-    yield "index", listed(COMMANDS, {name: (f"semsig {name}", lines[name]) for name in lines})
-    for name, command in group.commands.items():
-        yield name, command_page(f"semsig {name}", command)
+    yield "index", commands_page()
+    for item in commands().values():
+        yield item.name, command_page(item)
 
 
-def command_page(name: str, command: Any) -> str:  # noqa: ANN401
+def commands_page() -> str:
+    """Return the page that lists the commands by group."""
+    parts = [COMMANDS]
+    for group, items in itertools.groupby(commands().values(), key=lambda item: item.group):
+        rows = [
+            f"| [`semsig {item.name}`]({item.name}.md) | {marked(item.line)} |" for item in items
+        ]
+        parts.append(f"## {group}\n\n| Name | What it does |\n| --- | --- |\n" + "\n".join(rows))
+    pages = "\n".join(commands())
+    return "\n\n".join([*parts, f"```{{toctree}}\n:hidden:\n\n{pages}\n```\n"])
+
+
+def command_page(item: Command) -> str:
     """Return the page of a command, with an address for each of its options."""
-    context = command.make_context(name, [], resilient_parsing=True)
-    usage = command.get_usage(context).removeprefix("Usage: ")
+    name = f"semsig {item.name}"
+    arguments = [field.usage for field in item.fields if field.option.positional]
+    usage = " ".join([name, *arguments, "[OPTIONS]"])
     parts = [
-        f"# `{name}`\n\n{marked(command.help)}\n",
-        f"```text\n{' '.join(usage.split())}\n```\n\n```{{program}} {name}\n```\n",
+        f"# `{name}`\n\n{marked(item.help)}\n",
+        f"```text\n{usage}\n```\n\n```{{program}} {name}\n```\n",
     ]
-    headings = {"argument": "Arguments", "option": "Options"}
-    for parameter in command.get_params(context):
-        heading = headings.pop(parameter.param_type_name, None)
-        if heading:
-            parts.append(f"## {heading}\n")
-        flags, text = parameter.get_help_record(context)
-        option = flags.replace(" / ", ", ")
-        parts.append(f"````{{option}} {option}\n{described(text)}\n````\n")
+    sections: dict[str, list[str]] = {"Arguments": [], "Options": [], "More options": []}
+    for field in [*item.fields, *printing_of(item)]:
+        option = field.option
+        heading = "More options" if option.advanced else "Options"
+        sections["Arguments" if option.positional else heading].append(option_text(field))
+    sections["Options"].append(f"````{{option}} --help\n{HELP}\n````\n")
+    for heading, texts in sections.items():
+        if texts:
+            parts += [f"## {heading}\n", *texts]
     return "\n".join(parts)
 
 
-def described(text: str) -> str:
-    """Return the help of an option, with its default and its range on lines of their own."""
-    notes: list[str] = []
-    while match := NOTES.search(text):
-        text = text[: match.start()]
-        notes[:0] = [RANGE.sub(r"from \1 to \2", note) for note in match[1].split("; ")]
-    lines = [note[0].upper() + note[1:] for note in notes]
-    return marked(text) + "".join(f"\n\n*{marked(line)}.*" for line in lines)
+def option_text(field: Field) -> str:
+    """Return an option with its help, and a line each for its default, range and names."""
+    details = [detail[0].upper() + detail[1:] for detail in field.details]
+    if field.option.suggestions is not None:
+        details.append(f"Names: {', '.join(field.option.suggestions())}")
+    lines = [marked(field.option.help), *(f"*{marked(line)}.*" for line in details)]
+    text = "\n\n".join(lines)
+    return f"````{{option}} {field.usage}\n{text}\n````\n"
 
 
 def marked(text: str) -> str:

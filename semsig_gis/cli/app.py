@@ -70,16 +70,13 @@ class _Command(TyperCommand):
     def format_options(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - of typer
         sections: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
         for parameter in self.get_params(ctx):
-            names, text = parameter.get_help_record(ctx) or ("", "")
             field = self.fields.get(parameter.name)
-            if field is not None:
-                if field.option.advanced and SHOW_ALL not in ctx.meta:
-                    continue
-                details = "; ".join(field.details)
-                text = f"{field.option.help}  [{details}]" if details else field.option.help
-            positional = field is not None and field.option.positional
-            heading = "Arguments" if positional else "Options"
-            sections[heading].append((names.partition(" <")[0], text))
+            if field is None:  # --help and --help-all
+                sections["Options"].append(parameter.get_help_record(ctx) or ("", ""))
+            elif not field.option.advanced or SHOW_ALL in ctx.meta:
+                details = f"  [{'; '.join(field.details)}]" if field.details else ""
+                heading = "Arguments" if field.option.positional else "Options"
+                sections[heading].append((field.usage, field.option.help + details))
         _write_sections(formatter, sections)
 
 
@@ -120,7 +117,7 @@ class _Group(TyperGroup):
         width = max(map(len, self.commands))
         sections: dict[str, list[tuple[str, str]]] = {group: [] for group in GROUPS}
         for item in here.values():
-            sections[item.group].append((item.name.ljust(width), item.help.partition("\n")[0]))
+            sections[item.group].append((item.name.ljust(width), item.line))
         sections["Other packages"] = [
             (name.ljust(width), f"Command of {package}.")
             for name, package in installed_command_names().items()
@@ -210,8 +207,8 @@ def _parameter(field: Field) -> inspect.Parameter:
         names = [field.flag, option.short] if option.short else [field.flag]
         if field.kind is bool:
             about["metavar"] = None
-            if field.optional or field.default:
-                names[0] += f"/{field.flag.replace('--', '--no-', 1)}"
+            if field.opposite:
+                names[0] += f"/{field.opposite}"
         parameter = typer.Option(*names, **about)
     return inspect.Parameter(
         field.name,

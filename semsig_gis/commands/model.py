@@ -181,6 +181,23 @@ class Field:
         return "TEXT"
 
     @property
+    def opposite(self) -> str:
+        """The name on the command line that turns a choice off; empty for others."""
+        is_choice = self.kind is bool and (self.optional or self.default)
+        return self.flag.replace("--", "--no-", 1) if is_choice else ""
+
+    @property
+    def usage(self) -> str:
+        """The name on the command line with the word for the value."""
+        if self.option.positional:
+            name = f"{self.flag}..." if self.many else self.flag
+            return name if self.required else f"[{name}]"
+        names = ", ".join(filter(None, [self.option.short, self.flag]))
+        if self.kind is not bool:
+            return f"{names} {self.metavar}"
+        return f"{names}, {self.opposite}" if self.opposite else names
+
+    @property
     def details(self) -> list[str]:
         """The default, the range, and whether the value is required, for the help."""
         option = self.option
@@ -199,7 +216,7 @@ class Field:
         if self.option.positional:
             return [str(item) for item in (value if self.many else [value])]
         if self.kind is bool:
-            return [self.flag if value else self.flag.replace("--", "--no-", 1)]
+            return [self.flag if value else self.opposite]
         items = value if self.many else [value]
         return [word for item in items for word in (self.flag, _text(item))]
 
@@ -223,6 +240,11 @@ class Command:
     def help(self) -> str:
         """The description: a first line, and paragraphs."""
         return inspect.getdoc(self.request) or ""
+
+    @property
+    def line(self) -> str:
+        """The first line of the description."""
+        return self.help.partition("\n")[0]
 
     @property
     def fields(self) -> tuple[Field, ...]:

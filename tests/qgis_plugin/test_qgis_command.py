@@ -246,9 +246,9 @@ def test_command_line_quotes_any_value() -> None:
     assert line[0] == "load"
     load = typer.main.get_command(app).commands["load"]  # type: ignore[attr-defined]
     values = load.make_context("load", line[1:]).params
-    assert [str(path) for path in values["files"]] == values["names"] == nasty
+    assert [str(path) for path in values["files"]] == values["catalog"] == nasty
     assert (str(values["out"]), values["crs"]) == (nasty[0], nasty[5])
-    assert values["filters"] is True
+    assert values["filter"] is True
     assert not values["layer"]
 
 
