@@ -162,6 +162,12 @@ class Field:
         return name if self.option.positional else f"--{name}"
 
     @property
+    def suffixes(self) -> tuple[str, ...]:
+        """The suffixes of the file that is written; empty if none is."""
+        writes = self.option.writes
+        return (writes,) if isinstance(writes, str) else writes or ()
+
+    @property
     def title(self) -> str:
         """The title in dialogs."""
         return self.option.title or self.name.strip("_").replace("_", " ").capitalize()
@@ -363,9 +369,8 @@ def run_command(request: Any, reporter: Reporter = SILENT) -> Result:  # noqa: A
         for path in _paths(values[field.name])
     }
     for field in fields:
-        suffixes = field.option.writes
         path = values[field.name]
-        if suffixes is None or path is None:
+        if not field.suffixes or path is None:
             continue
         if os.path.realpath(path) in used:
             raise InputError(
@@ -373,10 +378,10 @@ def run_command(request: Any, reporter: Reporter = SILENT) -> Result:  # noqa: A
                 "well; give another name."
             )
         used.add(os.path.realpath(path))
-        accepted = (suffixes,) if isinstance(suffixes, str) else suffixes
-        if "" not in accepted and path.suffix.lower() not in accepted and not path.is_dir():
+        fits = path.suffix.lower() in field.suffixes or "" in field.suffixes
+        if not fits and not path.is_dir():
             raise InputError(
-                f"{path} cannot be written; the name must end in {' or '.join(accepted)}."
+                f"{path} cannot be written; the name must end in {' or '.join(field.suffixes)}."
             )
     result: Result = request.run(reporter)
     return result

@@ -129,9 +129,8 @@ def field_schema(field: Field) -> dict[str, Any]:
         "x-positional": option.positional,
         "x-advanced": option.advanced,
         "x-reads": option.reads,
+        "x-writes": [*field.suffixes],
         "x-suggestions": [] if option.suggestions is None else list(option.suggestions()),
     }
     schema |= {name: value for name, value in details.items() if value}
-    if option.writes is not None:
-        schema["x-writes"] = [option.writes] if isinstance(option.writes, str) else option.writes
     return schema

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -18,6 +19,21 @@ from semsig_gis.database import open_database, save_database
 from semsig_gis.objects import save_objects, save_surroundings
 
 X, Y = 770_000.0, 6_280_000.0
+ROWS = [f"{X + 23 * i + 5},{Y + 31 * (i % 3)},DD,{30 + i};270" for i in range(15)]
+SAMPLES = "\n".join(["x,y,types,bearings", *ROWS, ""]).replace(";", " ")
+BOXES = {
+    "images": [{"id": 1, "file_name": "a.jpg", "width": 4000, "height": 3000}],
+    "categories": [{"id": 15, "name": "bench"}],
+    "annotations": [{"id": 1, "image_id": 1, "category_id": 15, "bbox": [900, 1400, 300, 200]}],
+}
+SPEC = """
+database = "city.parquet"
+queries = 3
+[methods]
+paper = "edit+edit:5%"
+[distortions]
+light = ["light"]
+"""
 
 
 @pytest.fixture(scope="session")
@@ -33,6 +49,10 @@ def tiny_city(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "jump.jsonl": '{"types": "D"}\n{"types": "D"}\n',
         "placeless.csv": "types,bearings\nD,3\n",
         "far.csv": "x,y,types,bearings\n1,2,D,3\n",
+        "samples.csv": SAMPLES,
+        "route.jsonl": '{"types": "D"}\n{"types": "D", "dx": 10, "dy": 0, "sigma": 1}\n',
+        "boxes.json": json.dumps(BOXES),
+        "spec.toml": SPEC,
     }.items():
         (folder / name).write_text(text, encoding="utf-8")
     lights = [shapely.Point(X + 23 * i, Y + 31 * (i % 3)) for i in range(20)]
@@ -54,6 +74,7 @@ def tiny_city(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "load . --catalog tiny.toml --out objects.parquet",
         "build objects.parquet --out city.parquet",
         "export city.parquet --out cells.gpkg",
+        "evaluate city.parquet --queries 5 --out compared",
     )
     city = open_database(folder / "city.parquet")
     crossing = city.taxonomy.by_name("crossing").code
