@@ -56,12 +56,6 @@ def test_help_fits_a_terminal(command: str, run: Run) -> None:
     assert [line for line in out.splitlines() if len(line) > 80] == []
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_can_be_quiet_or_verbose(command: str) -> None:
-    options = {name for parameter in COMMANDS[command].params for name in parameter.opts}
-    assert options >= {"--quiet", "--verbose"}
-
-
 ACCEPTED: dict[str, Callable[[Any], object]] = {
     "build-step": GridSpec,
     "build-radius": SignatureSpec,

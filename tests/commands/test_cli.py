@@ -18,14 +18,11 @@ import shapely
 from osm_xml import node, way, write_osm
 from sentences import sentence
 from servers import Answer, Server
-from stand_ins import STAND_INS
 
 from semsig_gis import __version__
 from semsig_gis.database import open_database
 
 if TYPE_CHECKING:
-    from stand_ins import StandIn
-
     from conftest import Run, RunOk
 
 DATA = Path(__file__).with_name("data")
@@ -79,7 +76,7 @@ def test_load_build_and_localize(run_ok: RunOk) -> None:
 
 
 @pytest.mark.usefixtures("city")
-def test_evaluate_map_and_export(run_ok: RunOk) -> None:
+def test_evaluate_and_map(run_ok: RunOk) -> None:
     line = "evaluate city.parquet --queries 30 --distortion light --seed 5 --method edit+edit:20%"
     summary = json.loads(run_ok(line, "--out", "eval", "--json"))
     assert summary["settings"]["queries"] == 30
@@ -95,12 +92,6 @@ def test_evaluate_map_and_export(run_ok: RunOk) -> None:
     assert "queries were placed within 50 m" in page
     assert "map.html" in run_ok("map city.parquet --evaluation eval --out map.html")
     assert Path("map.html").stat().st_size > 1000
-
-    run_ok("export city.parquet --objects objects.parquet --out city.gpkg")
-    assert set(gpd.list_layers("city.gpkg")["name"]) >= {"cells", "objects"}
-    assert set(gpd.read_file("city.gpkg", layer="cells").geom_type) == {"Polygon"}
-    run_ok("export city.parquet --geometry point --out points.gpkg")
-    assert set(gpd.read_file("points.gpkg", layer="cells").geom_type) == {"Point"}
 
 
 @pytest.mark.usefixtures("city")
@@ -291,29 +282,6 @@ def test_fetch_from_a_portal_and_offline_from_the_cache(city: Path, run: Run) ->
     code, out, err = run(fetch, "2,48,3,49", "--offline")
     assert (code, "from the cache" in err, json.loads(out)["objects"]) == (0, True, 1)
     sentence(run(fetch, "5,48,6,49", "--offline"), "127.0.0.1")
-
-
-@pytest.mark.parametrize("kind", STAND_INS, ids=lambda kind: kind.__name__)
-def test_fetch_needs_only_an_address_and_a_dataset(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run, kind: type[StandIn]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    with Server() as server:
-        service = kind(server)
-        Path("somewhere.toml").write_text(
-            f'name = "somewhere"\ntitle = "Somewhere"\nreader = "{service.reader}"\n'
-            f'endpoints = ["{service.endpoint}"]\n[[layers]]\nname = "lamps"\n'
-            f'class = "street_light"\ndataset = "{service.dataset}"\nid_field = "objectid"\n',
-            encoding="utf-8",
-        )
-        fetch = "fetch somewhere.toml --area 2.355,48.8,2.385,48.9 --cache c --out o.parquet --json"
-        code, out, err = run(fetch)
-        assert code == 0, err
-        assert json.loads(out)["objects"] == 3
-        assert f"lamps: {3 if service.cuts else 5} rows, 0.00 MB, from the portal" in err
-        service.page = Answer(b"<html></html>")
-        shutil.rmtree("c")
-        sentence(run(fetch), "a web page")
 
 
 def test_demo_writes_a_map_layers_and_a_database(tmp_path: Path, run_ok: RunOk) -> None:
