@@ -26,13 +26,12 @@ from semsig_gis.sources import (
     LayerSpec,
     check_compression_ratio,
     list_layers,
-    mapillary,
-    overture,
     read_layer,
     read_layers,
     reader,
 )
 from semsig_gis.sources.osm import features, file, overpass
+from semsig_gis.sources.readers import mapillary, overture
 from semsig_gis.sources.services import layers as services
 
 if TYPE_CHECKING:
