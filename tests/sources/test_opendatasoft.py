@@ -165,19 +165,6 @@ def test_exact_field_name_is_preferred(fields: list[str], expected: str | None) 
     assert find_field("gid", spec, fields) == expected
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"id_field": "idbaze"},
-        {"where": (("DOMAIN", ("Alignement",)),)},
-        {"class_by": ClassBy("KIND", (("x", "bench"),))},
-    ],
-)
-def test_absent_field_is_named(read_as: Read, tmp_path: Path, change: dict[str, Any]) -> None:
-    with refused(CatalogError, *change, "trees", str(tmp_path / "a.csv"), "IDBASE"):
-        read_as("a.csv", FILES["labels.csv"], replace(TREES, **change))
-
-
 def test_shape_is_preferred_to_point_and_point_to_coordinates(read_as: Read) -> None:
     line = {"type": "LineString", "coordinates": [[2.0, 48.0], [2.2, 48.0]]}
     rows = [
