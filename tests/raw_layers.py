@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+ENGINES = ("pyogrio, then fiona", "fiona", "pyogrio")
+"""How vector files are read: usually, with fiona for all rows, and without fiona."""
+
+
 def raw_layer(
     geometries: Sequence[object],
     *,

@@ -28,7 +28,7 @@ from semsig_gis.core import (
     visible,
     visible_lines,
 )
-from semsig_gis.localization import METRIC_NAMES
+from semsig_gis.localization import METRICS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -311,7 +311,7 @@ MethodText = Annotated[
     str | None,
     typer.Option(
         "--method",
-        help=f"Rank by likelihood, or by distance as TYPES+ANGLES ({', '.join(METRIC_NAMES)}), "
+        help=f"Rank by likelihood, or by distance as TYPES+ANGLES ({', '.join(METRICS)}), "
         "types:edit or angles:edit; add :5% for two stages, :alpha=0.7, :raw or "
         f":weights=INSERT/DELETE/SUBSTITUTE.  [default: {DEFAULT_METHOD}]",
         show_default=False,

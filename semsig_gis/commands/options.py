@@ -18,7 +18,7 @@ from semsig_gis.core import (
     EmptyResultError,
     InputError,
 )
-from semsig_gis.localization import METRIC_NAMES
+from semsig_gis.localization import METRICS
 
 if TYPE_CHECKING:
     import folium
@@ -64,7 +64,7 @@ MethodText = Annotated[
     str | None,
     Option(
         "Rank by likelihood, or by distance as TYPES+ANGLES "
-        f"({', '.join(METRIC_NAMES)}), types:edit or angles:edit; add :5% for two stages, "
+        f"({', '.join(METRICS)}), types:edit or angles:edit; add :5% for two stages, "
         ":alpha=0.7, :raw or :weights=INSERT/DELETE/SUBSTITUTE.",
         title="Method",
         metavar="METHOD",

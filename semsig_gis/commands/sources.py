@@ -89,14 +89,13 @@ class Sources:
 
     def run(self, _reporter: Reporter) -> Result:
         """Return the catalogues, or one of them."""
-        from semsig_gis.core import installed_readers
         from semsig_gis.sources import READERS, load_catalog
 
         if self.name is not None:
             catalog = load_catalog(self.name)
             return Result(values=partial(asdict, catalog), text=_details(catalog))
         listed = [load_catalog(name) for name in catalogs()]
-        readers = sorted({*READERS, *installed_readers(reserved=READERS)})
+        readers = list(READERS)
         return Result(
             values=lambda: {"catalogs": [*map(_row, listed)], "readers": readers},
             text=_list(listed, readers),

@@ -85,6 +85,7 @@ from .plugins import installed_readers as installed_readers
 from .presentation import map_with as map_with
 from .presentation import plot_with as plot_with
 from .presentation import register_loader as register_loader
+from .registry import Registry as Registry
 from .resources import announce as announce
 from .resources import free_address_space as free_address_space
 from .resources import raise_if_short as raise_if_short

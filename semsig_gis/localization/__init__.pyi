@@ -5,7 +5,6 @@ from .answers import Answer as Answer
 from .answers import Ranking as Ranking
 from .distance.memo import DistanceMemo as DistanceMemo
 from .distance.method import Method as Method
-from .distance.metric_names import METRIC_NAMES as METRIC_NAMES
 from .distance.metrics import METRICS as METRICS
 from .distance.metrics import Distances as Distances
 from .distance.metrics import metric as metric

@@ -30,8 +30,7 @@ from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_ext
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
 from semsig_gis.sources import (
-    MERGING,
-    PRUNING,
+    READERS,
     TAGS_READER,
     file_reader,
     find_files,
@@ -442,12 +441,12 @@ def read_files(
             name = reader_of[path] if spec.reader == TAGS_READER else spec.reader
             by_reader.setdefault(name, []).append(path)
         for name, files in by_reader.items():
-            for group in [files] if name in MERGING else ([path] for path in files):
+            for group in [files] if READERS[name].merging else ([path] for path in files):
                 specs_of.setdefault((name, tuple(group)), []).append(spec)
     layers: list[RawLayer] = []
     for count, ((name, sources), group_specs) in enumerate(specs_of.items(), start=1):
         source = sources if len(sources) > 1 else sources[0]
-        options = {"area": area} if name in PRUNING else {}
+        options = {"area": area} if READERS[name].pruning else {}
         layers.extend(reader(name)(source, group_specs, filters=filters, crs=crs, **options))
         if progress is not None:
             progress(count, len(specs_of))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from semsig_gis.core import SemsigError
 from semsig_gis.objects.load import read_files
-from semsig_gis.sources import MERGING, find_files
+from semsig_gis.sources import READERS, find_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,10 +24,9 @@ def layers_in_same_extracts(catalog: Catalog, specs: Sequence[LayerSpec]) -> tup
 
     They can be counted without reading another file, because an extract is always read completely.
     """
-    files = {spec.files for spec in specs if spec.reader in MERGING}
-    return tuple(
-        spec for spec in _others(catalog, specs) if spec.reader in MERGING and spec.files in files
-    )
+    files = {spec.files for spec in specs if READERS[spec.reader].merging}
+    others = (spec for spec in _others(catalog, specs) if READERS[spec.reader].merging)
+    return tuple(spec for spec in others if spec.files in files)
 
 
 def read_small_layers(

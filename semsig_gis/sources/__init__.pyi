@@ -30,9 +30,6 @@ from .detect import detect_catalogs as detect_catalogs
 from .downloads import fetch_layers as fetch_layers
 from .downloads import find_area as find_area
 from .downloads import open_cache as open_cache
-from .files import MERGING as MERGING
-from .files import PRUNING as PRUNING
-from .files import READERS as READERS
 from .files import TAGS_READER as TAGS_READER
 from .files import file_reader as file_reader
 from .files import find_files as find_files
@@ -62,7 +59,6 @@ from .layer_spec import GeometryKind as GeometryKind
 from .layer_spec import LayerSpec as LayerSpec
 from .layer_spec import Role as Role
 from .layer_spec import WidthBy as WidthBy
-from .mapillary import MOST_FEATURES as MOST_FEATURES
 from .numbers import decimal as decimal
 from .osm.elements import TagIndex as TagIndex
 from .osm.elements import has_tags as has_tags
@@ -83,6 +79,8 @@ from .paths import FILE_SUFFIXES as FILE_SUFFIXES
 from .paths import files_in as files_in
 from .paths import require_file as require_file
 from .probe import probe_file as probe_file
+from .readers.mapillary import MOST_FEATURES as MOST_FEATURES
+from .registry import READERS as READERS
 from .rows import LATITUDE_LIMIT as LATITUDE_LIMIT
 from .rows import LONGITUDE_LIMIT as LONGITUDE_LIMIT
 from .rows import WGS84 as WGS84

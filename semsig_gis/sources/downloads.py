@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING
 from platformdirs import user_cache_path
 
 from semsig_gis.core import InputError
-from semsig_gis.sources import mapillary, overture
 from semsig_gis.sources.clip import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.access_token import AccessToken
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
 from semsig_gis.sources.osm import overpass
-from semsig_gis.sources.services import fetch as services
+from semsig_gis.sources.registry import READERS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from types import ModuleType
+    from collections.abc import Callable, Sequence
 
     import geopandas as gpd
 
@@ -27,13 +25,6 @@ if TYPE_CHECKING:
     from semsig_gis.sources.catalog import Catalog
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
-
-# Readers of services that send an area in tiles, each a file.
-TILED: Mapping[str, ModuleType] = {
-    "mapillary": mapillary,
-    "osm_file": overpass,
-    "overture": overture,
-}
 
 
 def fetch_layers(
@@ -88,40 +79,26 @@ def fetch_layers(
     semsig_gis.core.errors.InputError: catalogue 'montpellier' has no service to fetch from; use
     `semsig load` on files.
     """
-    if not catalog.endpoints or catalog.reader not in {*services.SERVICES, *TILED}:
+    fetch = READERS[catalog.reader].fetch
+    if not catalog.endpoints or fetch is None:
         raise InputError(
             f"catalogue {catalog.name!r} has no service to fetch from; use `semsig load` on files."
         )
-    layers: list[RawLayer] = []
     if catalog.token is not None and not http.offline:
         http = replace(http, token=AccessToken.from_environment(catalog.token))
-    service = TILED.get(catalog.reader)
-    if service is not None:
-        tiles = service.fetch_layers(
-            specs, endpoints=catalog.endpoints, area=area, cache=cache, spec=http, progress=progress
-        )
-        for layer in service.read_layers(tiles, specs, filters=filters):
-            layers.append(clip_layer(layer, area))
-            tell(f"{layer.spec.name}: {len(layers[-1].table):,} rows; {layer.spec.terms}")
-        return tuple(layers)
-    for download in services.fetch_layers(
-        catalog.reader,
+    layers: list[RawLayer] = []
+    for layer, size in fetch(
         specs,
         endpoints=catalog.endpoints,
         area=area,
         cache=cache,
         spec=http,
+        filters=filters,
         progress=progress,
     ):
-        layer = download.read(filters=filters)
         layers.append(clip_layer(layer, area))
-        from_cache = all(file.from_cache for file in download.files)
-        tell(
-            f"{layer.spec.name}: {layer.counts.read:,} rows, "
-            f"{sum(file.bytes for file in download.files) / 1e6:.2f} MB, "
-            f"from {'the cache' if from_cache else 'the portal'}, "
-            f"fetched {min(file.fetched_at for file in download.files)}; {layer.spec.terms}"
-        )
+        rows = size or f"{len(layers[-1].table):,} rows"
+        tell(f"{layer.spec.name}: {rows}; {layer.spec.terms}")
     return tuple(layers)
 
 

@@ -3,41 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semsig_gis.core import SourceError, UnknownNameError, installed_readers, nearest_name
+from semsig_gis.core import SourceError
 from semsig_gis.sources.osm import features
 from semsig_gis.sources.paths import files_in, matches_pattern
 from semsig_gis.sources.probe import probe_file
+from semsig_gis.sources.registry import READERS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from semsig_gis.sources.layer import Reader
     from semsig_gis.sources.layer_spec import LayerSpec
-
-PACKAGE = __name__.rpartition(".")[0]
-# Module of this package that contains the function `read_layers` of a reader.
-READERS = {
-    "arcgis": "services.layers",
-    "ckan": "services.layers",
-    "mapillary": "mapillary",
-    "ogc_features": "services.layers",
-    "opendatasoft": "services.layers",
-    "osm_features": "osm.features",
-    "osm_file": "osm.file",
-    "overpass": "osm.overpass",
-    "overture": "overture",
-    "socrata": "services.layers",
-    "vector_file": "vector.file",
-    "wfs": "services.layers",
-}
-
-# Readers that read several files as one map, and readers that can skip rows outside an `area`.
-MERGING = frozenset({"mapillary", "osm_features", "osm_file", "overpass", "overture"})
-PRUNING = frozenset({"overture"})
 
 # The reader of layers that are selected by tags, in a file of any format.
 TAGS_READER = "osm_file"
@@ -47,17 +26,7 @@ MOST_NAMES = 4
 
 def reader(name: str) -> Reader:
     """Return a built-in reader, or one of the entry points ``semsig_gis.readers``, by name."""
-    if name in READERS:
-        read: Reader = importlib.import_module(f"{PACKAGE}.{READERS[name]}").read_layers
-        return read
-    others = installed_readers()
-    if name in others:
-        return others[name]
-    names = sorted({*READERS, *others})
-    raise UnknownNameError(
-        f"reader {name!r} is unknown{nearest_name(name, names)}; "
-        f"the readers are {', '.join(names)}."
-    )
+    return READERS[name].read
 
 
 def file_reader(path: Path, *, sure: bool = False) -> str | None:
@@ -111,7 +80,7 @@ def find_files(
     missing = []
     for spec in specs:
         direct_files = [path for path in files if matches_pattern(path.name, spec.files)]
-        merging = spec.reader in MERGING
+        merging = READERS[spec.reader].merging
         patterns = (spec.files,) if merging else tuple((pattern,) for pattern in spec.files)
         in_folder = (
             [path for path in in_folders if matches_pattern(path.name, any_)] for any_ in patterns

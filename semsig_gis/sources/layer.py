@@ -98,7 +98,7 @@ class RawLayer(Displayed):
 class Reader(Protocol):
     """A function that reads layers from one file in one pass.
 
-    The readers in `MERGING` also take several files, the readers in `PRUNING` an `area`.
+    A merging reader also takes several files, a pruning reader an `area` (see `Source`).
     """
 
     def __call__(

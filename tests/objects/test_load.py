@@ -26,6 +26,7 @@ from semsig_gis.objects import (
 )
 from semsig_gis.output import quality_tables
 from semsig_gis.sources import (
+    READERS,
     ClassBy,
     LayerSpec,
     RowCounts,
@@ -37,7 +38,6 @@ from semsig_gis.sources import (
     open_cache,
     paper_taxonomy,
 )
-from semsig_gis.sources.osm import file as osm_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -152,13 +152,13 @@ def test_file_is_read_once_for_all_its_layers(
         way(10, [1, 2], {"highway": "primary"}),
         way(11, [2, 3], {"highway": "road"}),
     )
-    real, calls = osm_file.read_layers, []
+    real, calls = READERS["osm_file"], []
 
     def counted(file: Path, specs: Sequence[LayerSpec], **options: Any) -> tuple[RawLayer, ...]:  # noqa: ANN401
         calls.append(file)
-        return real(file, specs, **options)
+        return real.read(file, specs, **options)
 
-    monkeypatch.setattr(osm_file, "read_layers", counted)
+    monkeypatch.setitem(READERS._objects, "osm_file", replace(real, read=counted))
     specs = choose_layers(osm, surroundings=True)
     steps: list[tuple[int, int]] = []
     layers, absent = read_files(specs, [path], progress=lambda *step: steps.append(step))

@@ -32,7 +32,7 @@ from semsig_gis.cli.app import app
 from semsig_gis.cli.console import VARIABLE
 from semsig_gis.core import DEFAULT_METHOD
 from semsig_gis.evaluation import parse_chain
-from semsig_gis.localization import METRIC_NAMES, NOISES, Method
+from semsig_gis.localization import METRICS, NOISES, Method
 from semsig_gis.sources import catalog_names, load_catalog
 
 unix = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are shell scripts")
@@ -262,7 +262,7 @@ def test_names_match_the_command() -> None:
         assert method == arguments.LIKELIHOOD or str(Method.parse(method))
     fusions = {method for method in arguments.METHODS if "+" in method and ":" not in method}
     # The dialog offers some of the metrics; each needs a sentence in three languages.
-    assert fusions <= {f"{name}+{name}" for name in METRIC_NAMES}
+    assert fusions <= {f"{name}+{name}" for name in METRICS}
     assert all(fusion in arguments.METHOD_HELP for fusion in fusions)
     for name in arguments.DISTORTIONS:
         assert parse_chain(name)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from machine import PATIENCE_S
+from raw_layers import ENGINES
 
 from semsig_gis.sources import Cache, HttpSpec, reader
 from semsig_gis.sources.vector import file as vector_file
@@ -57,7 +58,7 @@ def read_as(tmp_path: Path) -> Callable[..., RawLayer]:
     return call
 
 
-@pytest.fixture(params=["pyogrio, then fiona", "fiona", "pyogrio"])
+@pytest.fixture(params=ENGINES)
 def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """Run each test with pyogrio and fiona, with fiona for all rows, and without fiona."""
     engine: str = request.param

@@ -28,9 +28,9 @@ from stand_ins import sent
 
 from semsig_gis.core import CatalogError, CrsError, SourceError
 from semsig_gis.sources import Area, ClassBy, LayerSpec, find_field, fold
+from semsig_gis.sources.readers import opendatasoft
 from semsig_gis.sources.services.fetch import fetch_layers
 from semsig_gis.sources.services.layers import read_layers
-from semsig_gis.sources.services.opendatasoft import _outline
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -163,19 +163,6 @@ def test_fold_is_idempotent(name: str) -> None:
 def test_exact_field_name_is_preferred(fields: list[str], expected: str | None) -> None:
     spec = replace(TREES, aliases=(("gid", ("Identifiant",)),))
     assert find_field("gid", spec, fields) == expected
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"id_field": "idbaze"},
-        {"where": (("DOMAIN", ("Alignement",)),)},
-        {"class_by": ClassBy("KIND", (("x", "bench"),))},
-    ],
-)
-def test_absent_field_is_named(read_as: Read, tmp_path: Path, change: dict[str, Any]) -> None:
-    with refused(CatalogError, *change, "trees", str(tmp_path / "a.csv"), "IDBASE"):
-        read_as("a.csv", FILES["labels.csv"], replace(TREES, **change))
 
 
 def test_shape_is_preferred_to_point_and_point_to_coordinates(read_as: Read) -> None:
@@ -415,7 +402,7 @@ def fetched(server: Server, cache: Cache, quick: HttpSpec) -> Fetch:
 
     def fetch(layer: LayerSpec = TREES, **options: Any) -> Fetched:  # noqa: ANN401
         arguments = {"endpoints": [server.url], "cache": cache, "spec": quick, **options}
-        (download,) = fetch_layers("opendatasoft", [layer], **arguments)
+        (download,) = fetch_layers(opendatasoft.fetch_layer, [layer], **arguments)
         assert download.spec is layer
         (file,) = download.files
         return file
@@ -470,7 +457,7 @@ def test_short_outline_covers_the_long_one(corners: int, roughness: float, seed:
     area = shapely.Polygon(
         np.column_stack([2.35 + radii * np.cos(angles), 48.85 + radii * np.sin(angles)])
     )
-    text = _outline(area)
+    text = opendatasoft._outline(area)
     assert len(text) <= 2_000
     # Rounding to 7 decimals moves a corner by less than a centimetre.
     assert shapely.from_wkt(text).buffer(1e-7).covers(area)
@@ -526,7 +513,10 @@ def test_area_uses_the_name_of_the_point_field(server: Server, fetched: Fetch) -
 
 def test_dataset_name_is_quoted_in_the_path(server: Server, cache: Cache, fetched: Fetch) -> None:
     files_only = replace(TREES, dataset=None)
-    assert fetch_layers("opendatasoft", [files_only], endpoints=[server.url], cache=cache) == []
+    assert (
+        fetch_layers(opendatasoft.fetch_layer, [files_only], endpoints=[server.url], cache=cache)
+        == []
+    )
     with pytest.raises(CatalogError):
         fetched(replace(TREES, dataset="a/../b?c"))
     assert server.paths() == [f"{DATASETS}/a%2F..%2Fb%3Fc"]

@@ -24,7 +24,6 @@ from sentences import refused
 
 from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources import (
-    ClassBy,
     LayerSpec,
     RowCounts,
     TagIndex,
@@ -434,42 +433,6 @@ def test_deleted_elements_are_omitted(read: Read) -> None:
     assert (trees.counts.read, list(shapes_by_id(trees))) == (1, ["node/1"])
 
 
-def test_where_and_class_by_use_tags(read: Read) -> None:
-    by_colour = ClassBy("colour", (("red", "taxi_station"),), otherwise=True)
-    spec = replace(BENCHES, where=(("backrest", ("yes",)),), class_by=by_colour)
-    nodes = [
-        node(1, 2, 48, {**BENCH, "backrest": "yes"}),
-        node(2, 2, 48, {**BENCH, "backrest": "no"}),
-        node(3, 2, 48, BENCH),
-        node(4, 2, 48, {**BENCH, "backrest": "yes", "colour": "red"}),
-    ]
-    layer = read(spec, *nodes)
-    assert list(shapes_by_id(layer)) == ["node/1", "node/4"]
-    assert layer.table.class_name.tolist() == ["bench", "taxi_station"]
-    assert layer.counts.filtered == 2
-    everything = read(spec, *nodes, filters=False)
-    assert (len(everything.table), everything.counts.filtered) == (4, 0)
-
-
-def test_objects_below_the_street_are_excluded_and_counted(read: Read) -> None:
-    rules = (("level", ("<0",)), ("layer", ("<0",)), ("disused", ("*",)))
-    spec = replace(BENCHES, exclusions=rules)
-    tags = [
-        *({}, {"level": "0"}, {"level": "-1;0"}, {"disused": "no"}, {"layer": "1"}),
-        *({"level": "-1"}, {"level": "-2;-1"}, {"layer": "-1", "level": "-1"}, {"disused": "yes"}),
-        {"layer": "-1"},
-    ]
-    nodes = [node(number, 2, 48, {**BENCH, **more}) for number, more in enumerate(tags, start=1)]
-    layer = read(spec, *nodes)
-    assert list(shapes_by_id(layer)) == [f"node/{number}" for number in range(1, 6)]
-    assert layer.counts == RowCounts(read=10, excluded=5)
-    assert layer.notes == ("left out by the catalogue's not: level 3, layer 1, disused 1",)
-    everything = read(spec, *nodes, filters=False)
-    assert everything.counts == RowCounts(read=10)
-    above = replace(BENCHES, where=(("level", (">=0 or none",)),))
-    assert read(above, *nodes).counts == RowCounts(read=10, filtered=3)
-
-
 def test_other_crs_of_an_empty_layer_is_noted(read: Read) -> None:
     trees = read(TREES, crs="EPSG:2154")
     assert (trees.counts.read, len(trees.table), trees.table.crs) == (0, 0, "EPSG:4326")
@@ -521,37 +484,6 @@ def test_incomplete_or_invalid_element_is_counted(read: Read, element: str, mess
     assert list(shapes_by_id(buildings)) == ["way/20"]
     assert buildings.counts == RowCounts(read=2, unreadable=1)
     assert buildings.errors[0].partition(": ")[2].startswith(message)
-
-
-@pytest.fixture(scope="module")
-def big(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """Return the bytes of a file of many nodes in every format, and of files of other kinds."""
-    # Places that do not compress, so that blocks are long and the file is not cut between two.
-    places = np.random.default_rng(0).uniform(0, 80, (20_000, 2)).round(7).tolist()
-    nodes = (node(number, x, y, TREE) for number, (x, y) in enumerate(places, start=1))
-    return in_formats(write_osm(tmp_path_factory.mktemp("big") / "city.osm", *nodes)) | {
-        ".json": b'{"elements": []}',
-        ".gpx": b"<gpx></gpx>",
-        "bomb": b'<!DOCTYPE osm [<!ENTITY a "aaaa">]><osm version="0.6">&a;</osm>',
-    }
-
-
-OTHERS = [
-    (suffix, other, 1.0)
-    for suffix, other in itertools.product(PACKED, [*PACKED, ".json", ".gpx", "bomb"])
-    if suffix != other and (suffix, other) != (".osm.gz", ".osm")  # zlib reads what is not packed
-]
-CUT = [(suffix, suffix, part) for suffix in PACKED for part in (0.0, 0.001, 0.4, 0.9, 0.999)]
-
-
-@pytest.mark.parametrize(("suffix", "kind", "part"), CUT + OTHERS)
-def test_truncated_file_or_file_of_another_format_is_refused(
-    big: dict[str, bytes], tmp_path: Path, suffix: str, kind: str, part: float
-) -> None:
-    path = tmp_path / f"city{suffix}"
-    path.write_bytes(big[kind][: int(part * len(big[kind]))])
-    with refused(SourceError, str(path), "download it again"):
-        read_layers(path, [TREES])
 
 
 @pytest.mark.parametrize("name", ["city.osm.xz", "city.geojson", "city.gz", "osm", "-"])

@@ -21,7 +21,7 @@ from semsig_gis.sources import (
     load_catalog,
     parse_area,
 )
-from semsig_gis.sources.overture import fetch_layers, read_layers
+from semsig_gis.sources.readers.overture import fetch_layers, read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

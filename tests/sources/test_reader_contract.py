@@ -1,4 +1,4 @@
-"""What every reader does with files that are damaged, of another kind, absent or too large."""
+"""What every reader makes of the same rows, and of damaged, absent, other and too large files."""
 
 from __future__ import annotations
 
@@ -6,39 +6,378 @@ import bz2
 import gzip
 import io
 import json
-import tempfile
 import zipfile
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import geopandas as gpd
+import numpy as np
+import osmium
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+import pyogrio
 import pytest
 import shapely
 from geojson import collection, feature, point
+from osm_xml import node, write_osm
+from raw_layers import ENGINES
 from sentences import refused
 
-from semsig_gis.core import CrsError, SourceError
+from semsig_gis.core import CatalogError, CrsError, SourceError
 from semsig_gis.sources import (
     HARMLESS_BYTES,
+    ClassBy,
     LayerSpec,
+    RowCounts,
     check_compression_ratio,
     list_layers,
-    mapillary,
-    overture,
     read_layer,
     read_layers,
     reader,
 )
-from semsig_gis.sources.osm import features, file, overpass
-from semsig_gis.sources.services import layers as services
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
 
-pytestmark = pytest.mark.usefixtures("engine")
+    from semsig_gis.sources import RawLayer
+
+    Rows = Sequence[dict[str, Any]]
+    Read = Callable[..., RawLayer]
+    Write = Callable[[Rows], Read]
+
+X, Y, STEP = 2.0, 48.5, 1 / 64
+THINGS = LayerSpec(name="things", class_name="bench", crs="EPSG:4326")
+BENCH = {"amenity": "bench"}
+TAGGED = replace(THINGS, tags=((("amenity", ("bench",)),),))
+
+
+def places(rows: Rows) -> list[tuple[float, float]]:
+    return [(X + STEP * n, Y) for n in range(len(rows))]
+
+
+def frame(rows: Rows) -> gpd.GeoDataFrame:
+    table = pd.DataFrame(list(rows)) if rows else pd.DataFrame({"kind": pd.Series(dtype="str")})
+    return gpd.GeoDataFrame(
+        table, geometry=shapely.points(np.reshape(places(rows), (-1, 2))), crs="EPSG:4326"
+    )
+
+
+def write_vector(path: Path, rows: Rows) -> None:
+    # FlatGeobuf would put the rows in another order for its index.
+    options = {"SPATIAL_INDEX": "NO"} if path.suffix == ".fgb" else {}
+    pyogrio.write_dataframe(frame(rows), path, geometry_type="Point", **options)
+
+
+def write_parquet(path: Path, rows: Rows) -> None:
+    frame(rows).to_parquet(path)
+
+
+def write_zip(path: Path, rows: Rows) -> None:
+    folder = path.parent / "inner"
+    folder.mkdir(exist_ok=True)
+    write_vector(folder / "a.shp", rows)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in folder.iterdir():
+            archive.write(file, file.name)
+
+
+def write_csv(path: Path, rows: Rows) -> None:
+    table = frame(rows)
+    pd.DataFrame(table.drop(columns="geometry")).assign(
+        lon=table.geometry.x, lat=table.geometry.y
+    ).to_csv(path, sep=";", index=False)
+
+
+def elements(rows: Rows) -> list[tuple[int, float, float, dict[str, str]]]:
+    """Return number, place and tags of the rows as nodes of OpenStreetMap."""
+    return [
+        (n, x, y, BENCH | {key: str(value) for key, value in row.items() if value is not None})
+        for n, ((x, y), row) in enumerate(zip(places(rows), rows, strict=True), start=1)
+    ]
+
+
+def write_extract(path: Path, rows: Rows) -> None:
+    """Write an extract of OpenStreetMap, packed as its suffix says."""
+    plain = write_osm(path.with_suffix(".xml"), *(node(*element) for element in elements(rows)))
+    if path.suffix == ".pbf":
+        path.unlink(missing_ok=True)
+        with osmium.SimpleWriter(str(path)) as writer:
+            for element in osmium.FileProcessor(str(plain), osmium.osm.NODE):
+                writer.add(element)
+        return
+    content = plain.read_bytes()
+    if path.suffix == ".gz":
+        content = gzip.compress(content)
+    if path.suffix == ".bz2":
+        content = bz2.compress(content)
+    path.write_bytes(content)
+
+
+def write_overpass(path: Path, rows: Rows) -> None:
+    nodes = [
+        {"type": "node", "id": n, "lat": y, "lon": x, "tags": tags}
+        for n, x, y, tags in elements(rows)
+    ]
+    path.write_text(json.dumps({"elements": nodes}))
+
+
+def write_tagged(path: Path, rows: Rows) -> None:
+    features = [feature(point(x, y), tags, id=f"node/{n}") for n, x, y, tags in elements(rows)]
+    path.write_text(json.dumps(collection(features)))
+
+
+def write_mapillary(path: Path, rows: Rows) -> None:
+    pairs = enumerate(places(rows))
+    features = [{"id": n, "object_value": "x", "geometry": point(x, y)} for n, (x, y) in pairs]
+    path.write_text(json.dumps({"data": features}))
+
+
+def write_overture(path: Path, rows: Rows) -> None:
+    names = dict.fromkeys(key for row in rows for key in row)
+    columns = {name: [row.get(name) for row in rows] for name in names}
+    shapes = [shapely.to_wkb(shapely.Point(place)) for place in places(rows)]
+    tags = {name: ["bench"] * len(rows) for name in ("amenity", "class")}
+    ids = [f"gers-{n}" for n in range(len(rows))]
+    own = {"id": pa.array(ids, pa.string()), "geometry": pa.array(shapes, pa.binary()), **tags}
+    pq.write_table(pa.table({**own, **columns}), path)
+
+
+def write_portal(path: Path, rows: Rows) -> None:
+    pairs = zip(places(rows), rows, strict=True)
+    path.write_text(json.dumps([{"geo_point_2d": [y, x], **row} for (x, y), row in pairs]))
+
+
+def write_gml(path: Path, rows: Rows) -> None:
+    members = "".join(
+        "<member><thing>"
+        + "".join(f"<{key}>{value}</{key}>" for key, value in row.items() if value is not None)
+        + f"<place><gml:Point><gml:pos>{x} {y}</gml:pos></gml:Point></place></thing></member>"
+        for (x, y), row in zip(places(rows), rows, strict=True)
+    )
+    path.write_text(f'<FeatureCollection xmlns:gml="g">{members}</FeatureCollection>')
+
+
+class Case(NamedTuple):
+    """A reader, a kind of file that it reads, and the words of its errors."""
+
+    reader: str
+    suffix: str
+    write: Callable[[Path, Rows], object]
+    spec: LayerSpec
+    truncated: str = ""  # empty if the reader cannot detect it
+    absent: str = "does not exist"
+    folder: str = "is a folder"
+    crs: str = "EPSG:4326"  # of the layer, if the user states EPSG:2154
+
+
+DAMAGED = "it is damaged or not the kind"
+NO_OVERPASS = "is not JSON as Overpass servers send it"
+NO_ANSWER = "is not an answer of Mapillary about map features"
+NO_GEOPARQUET = "cannot be read as GeoParquet"
+LAMBERT = "EPSG:2154"
+KINDS = {
+    "CSV": Case("vector_file", "csv", write_csv, THINGS, crs=LAMBERT),
+    "FlatGeobuf": Case("vector_file", "fgb", write_vector, THINGS),
+    "GeoJSON": Case("vector_file", "geojson", write_vector, THINGS, "cannot be read ("),
+    "GeoPackage": Case("vector_file", "gpkg", write_vector, THINGS, "cannot be read ("),
+    "shapefile": Case("vector_file", "shp", write_vector, THINGS),
+    "archive": Case("vector_file", "zip", write_zip, THINGS, "cannot be read (File is not a zip"),
+    "OSM": Case("osm_file", "osm", write_extract, TAGGED, DAMAGED),
+    "OSM, gzip": Case("osm_file", "osm.gz", write_extract, TAGGED, DAMAGED),
+    "OSM, bzip2": Case("osm_file", "osm.bz2", write_extract, TAGGED, DAMAGED),
+    "OSM, pbf": Case("osm_file", "osm.pbf", write_extract, TAGGED, DAMAGED),
+    "Overpass": Case("overpass", "json", write_overpass, TAGGED, NO_OVERPASS,
+                     "cannot be read (No such file", "cannot be read (Is a directory"),
+    "table of OSM": Case("osm_features", "geojson", write_tagged, TAGGED, "cannot be read"),
+    "Mapillary": Case("mapillary", "json", write_mapillary, THINGS,
+                      NO_ANSWER, NO_ANSWER, NO_ANSWER),
+    "Overture": Case("overture", "parquet", write_overture, TAGGED,
+                     NO_GEOPARQUET, NO_GEOPARQUET, NO_GEOPARQUET),
+    "portal JSON": Case("opendatasoft", "json", write_portal, THINGS, "is not whole JSON",
+                        crs=LAMBERT),
+    "portal CSV": Case("opendatasoft", "csv", write_csv, THINGS, crs=LAMBERT),
+    "GeoParquet": Case("opendatasoft", "parquet", write_parquet, THINGS, "is not a whole Parquet"),
+    "GML": Case("wfs", "gml", write_gml, THINGS, "is not whole GML", crs=LAMBERT),
+}  # fmt: skip
+# Only vector files are read by more than one engine.
+EACH = [
+    (engine, kind)
+    for kind, case in KINDS.items()
+    for engine in (ENGINES if case.reader == "vector_file" else ENGINES[:1])
+]
+WITH_VALUES = [(engine, kind) for engine, kind in EACH if kind != "Mapillary"]
+WITH_FIELDS = [(engine, kind) for engine, kind in WITH_VALUES if KINDS[kind].spec is not TAGGED]
+# The other readers read the rows before the end, or cannot detect it.
+DETECTING = [(engine, kind) for engine, kind in EACH if KINDS[kind].truncated]
+
+
+def by_each(cases: Sequence[tuple[str, str]]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize(("engine", "kind"), cases, indirect=["engine"])
+
+
+@pytest.fixture
+def case(engine: str, kind: str) -> Case:  # noqa: ARG001 - the engine patches the reader
+    return KINDS[kind]
+
+
+@pytest.fixture
+def path(case: Case, tmp_path: Path) -> Path:
+    return tmp_path / f"things.{case.suffix}"
+
+
+@pytest.fixture
+def write(case: Case, path: Path) -> Write:
+    """Write rows; return a function that reads their layer with changes of its specification."""
+
+    def call(rows: Rows) -> Read:
+        case.write(path, rows)
+
+        def read(*, filters: bool = True, crs: str | None = None, **change: Any) -> RawLayer:  # noqa: ANN401
+            spec = replace(case.spec, **change)
+            (layer,) = reader(case.reader)(path, [spec], filters=filters, crs=crs)
+            assert layer.counts.kept == len(layer.table)
+            assert layer.table.crs == (case.crs if crs else "EPSG:4326")
+            return layer
+
+        return read
+
+    return call
+
+
+def numbers(layer: RawLayer) -> list[int]:
+    """Return the numbers of the rows that were kept, by their places."""
+    assert set(layer.table.geometry.y) <= {Y}
+    return [int(n) for n in (layer.table.geometry.x - X) / STEP]
+
+
+KINDS_AND_SIZES = [
+    {"kind": "Tree", "size": 1, "height": 1.0},
+    {"kind": "tree", "size": 2, "height": 1.5},
+    {"kind": "Tree ", "size": 3, "height": 2.0},
+    {"kind": "Trees", "size": 10, "height": 2.5},
+    {"kind": "Tree", "size": 1, "height": 1.0},
+]
+
+
+@by_each(WITH_VALUES)
+def test_where_compares_values_exactly(write: Write) -> None:
+    read = write(KINDS_AND_SIZES)
+
+    def matching(**accepted: Any) -> list[int]:  # noqa: ANN401 - one value or several
+        where = [(k, v if isinstance(v, tuple) else (v,)) for k, v in accepted.items()]
+        layer = read(where=tuple(where))
+        assert layer.counts.filtered == 5 - len(layer.table)
+        return numbers(layer)
+
+    assert matching(kind=("tree", "Trees")) == [1, 3]
+    assert matching(size=1) == matching(size=1.0) == matching(size="1") == [0, 4]
+    assert matching(size=(1, 10)) == [0, 3, 4]
+    assert matching(height=1.5) == matching(height="1.5") == [1]
+    assert matching(height=1) == matching(kind="Tree", size=1) == [0, 4]
+    assert matching(kind="tree", size=1) == matching(kind=1) == matching(size=True) == []
+
+
+@by_each(WITH_VALUES)
+def test_class_by_where_and_not_select_rows(write: Write) -> None:
+    rows: Rows = [
+        {"state": "there", "level": "0", "colour": "red"},
+        {"state": "there", "level": "-1", "colour": "red"},
+        {"state": "gone", "level": "1", "colour": "red"},
+        {"state": "there", "level": None, "colour": "blue"},
+        {"state": "there", "level": "-1;0", "colour": None},
+    ]
+    change: dict[str, Any] = {
+        "where": (("state", ("there",)),),
+        "exclusions": (("level", ("<0",)),),
+        "class_by": ClassBy("colour", (("red", "taxi_station"),), otherwise=True),
+    }
+    read = write(rows)
+    layer = read(**change)
+    assert layer.counts == RowCounts(read=5, filtered=1, excluded=1)
+    assert numbers(layer) == [0, 3, 4]
+    assert layer.table["class_name"].tolist() == ["taxi_station", "bench", "bench"]
+    assert layer.notes == ("left out by the catalogue's not: level 1",)
+    everything = read(filters=False, **change)
+    assert (everything.counts, everything.notes) == (RowCounts(read=5), ())
+
+
+# A table without rows does not show that it is from OpenStreetMap.
+@by_each([case for case in EACH if case[1] != "table of OSM"])
+def test_file_without_rows_is_accepted(write: Write) -> None:
+    layer = write([])(rows=(1, 5))
+    assert (layer.counts, layer.notes) == (RowCounts(read=0), ("the layer has no rows",))
+    text = pd.Series(dtype="str").dtype
+    types = {"class_name": text, "source_id": text, "geometry": "geometry"}
+    assert layer.table.dtypes.to_dict() == types
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"where": (("kinds", ("a",)),)},
+        {"exclusions": (("kinds", ("a",)),)},
+        {"class_by": ClassBy("kinds", (("a", "bench"),))},
+        {"id_field": "kinds"},
+    ],
+)
+@by_each(WITH_FIELDS)
+def test_missing_field_is_refused(change: dict[str, Any], write: Write) -> None:
+    (key,) = change
+    read = write([{"kind": "a", "size": 1}])
+    words = f"no field 'kinds', which the catalogue names in {key.replace('exclusions', 'not')}"
+    with refused(CatalogError, "layer 'things'", words, "the nearest is 'kind'", "size"):
+        read(**change)
+    if key in {"where", "exclusions"}:  # which needs no field if it is not applied
+        assert read(filters=False, **change).counts.kept == 1
+
+
+MANY: Rows = [{"n": n, "text": f"{n * 2654435761 % 2**32:x}"} for n in range(2000)]
+
+
+@by_each(EACH)
+def test_file_is_read_in_its_own_crs(write: Write, case: Case, path: Path) -> None:
+    read = write([{"n": 1}])
+    assert read(crs="EPSG:2154").counts.kept == read().counts.kept == 1
+    assert reader(case.reader)(path, []) == ()
+
+
+@pytest.mark.parametrize("part", [0.0, 0.001, 0.4, 0.9, 0.999])
+@by_each(DETECTING)
+def test_truncated_file_is_refused(write: Write, case: Case, path: Path, part: float) -> None:
+    read = write(MANY)
+    path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
+    with refused(SourceError, str(path), case.truncated if part else ""):
+        read()
+
+
+@by_each(EACH)
+def test_absent_path_and_folder_are_refused(case: Case, path: Path) -> None:
+    read = reader(case.reader)
+    with refused(SourceError, case.absent):
+        read(path, [case.spec])
+    path.mkdir()
+    with refused(SourceError, case.folder):
+        read(path, [case.spec])
+
+
+@by_each([(engine, "GeoPackage") for engine in ENGINES])
+def test_damaged_schema_of_a_geopackage_is_refused(write: Write, path: Path) -> None:
+    read = write(MANY)
+    path.write_bytes(path.read_bytes().replace(b"CREATE TRIGGER", b"CREATE T\xffIGGER"))
+    with refused(SourceError, f"{path} cannot be read ("):
+        read()
+
+
+@by_each([(ENGINES[0], "GeoParquet")])
+def test_damaged_values_of_a_parquet_file_are_refused(write: Write, path: Path) -> None:
+    read = write(MANY)
+    content = path.read_bytes()  # the metadata at the end stays
+    size = 4 * len(content) // 5
+    path.write_bytes(content[:4] + bytes(size - 4) + content[size:])
+    with refused(SourceError, str(path), "whole Parquet"):
+        read()
 
 
 def parquet(**columns: list[Any]) -> bytes:
@@ -47,205 +386,87 @@ def parquet(**columns: list[Any]) -> bytes:
     return stream.getvalue()
 
 
-def vector(suffix: str) -> bytes:
-    """Return the content of a vector file with some points."""
-    places = shapely.points([(2 + n / 1000, 48) for n in range(500)])
-    table = gpd.GeoDataFrame({"n": range(500)}, geometry=places, crs="EPSG:4326")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"a.{suffix}"
-        table.to_file(path)
-        return path.read_bytes()
-
-
-PLAIN = LayerSpec(name="benches", class_name="bench")
-OSM = LayerSpec(name="benches", class_name="bench", tags=((("amenity", ("bench",)),),))
-OVERTURE = LayerSpec(name="benches", class_name="bench", tags=((("class", ("bench",)),),))
-WKB = [shapely.to_wkb(shapely.Point(2, 48))]
-POINT = point(2, 48)
-BENCH = {"amenity": "bench"}
-
-
-def encoded(content: object) -> bytes:
-    return json.dumps(content).encode()
-
-
-class Case(NamedTuple):
-    """A reader with a file of benches, and the words of its errors."""
-
-    read: Callable[..., Any]
-    spec: LayerSpec
-    name: str
-    content: bytes
-    truncated: str = ""  # empty if the reader cannot detect it
-    absent: str = "does not exist"
-    folder: str = "is a folder"
-    crs: str = "EPSG:4326"  # of the layer, if the user states EPSG:2154
-    rows: int = 1
-
-
-NO_OVERPASS = "is not JSON as Overpass servers send it"
-NO_GEOPARQUET = "cannot be read as GeoParquet"
-NO_ANSWER = "is not an answer of Mapillary about map features"
-OSM_XML = (
-    b'<osm version="0.6"><node id="1" version="1" lat="48" lon="2">'
-    b'<tag k="amenity" v="bench"/></node></osm>'
-)
-OVERPASS = {"elements": [{"type": "node", "id": 1, "lat": 48, "lon": 2, "tags": BENCH}]}
-GEOJSON = collection([feature(POINT, BENCH)])
-MAP_FEATURES = {"data": [{"id": "1", "object_value": "x", "geometry": POINT}]}
-GML = (
-    b'<FeatureCollection xmlns:gml="g"><member><a><p><gml:Point><gml:pos>2 48</gml:pos>'
-    b"</gml:Point></p></a></member></FeatureCollection>"
-)
-OVERTURE_COLUMNS: dict[str, list[Any]] = {"id": ["1"], "geometry": WKB, "class": ["bench"]}
-VECTOR = reader("vector_file")
-IN_DEGREES = replace(PLAIN, crs="EPSG:4326")
-GEOPACKAGE, FLATGEOBUF = vector("gpkg"), vector("fgb")
-CASES = {
-    "vector GeoJSON": Case(VECTOR, PLAIN, "a.geojson", encoded(GEOJSON), "cannot be read (",
-                           crs="EPSG:2154"),
-    "vector GeoPackage": Case(VECTOR, PLAIN, "a.gpkg", GEOPACKAGE, "cannot be read (", rows=500),
-    "vector FlatGeobuf": Case(VECTOR, PLAIN, "a.fgb", FLATGEOBUF, rows=500),
-    "vector CSV": Case(VECTOR, IN_DEGREES, "a.csv", b"x;y\n2;48\n", crs="EPSG:2154"),
-    "osm_file": Case(file.read_layers, OSM, "a.osm", OSM_XML, "it is damaged or not the kind"),
-    "overpass": Case(overpass.read_layers, OSM, "a.json", encoded(OVERPASS), NO_OVERPASS,
-                     "cannot be read (No such file", "cannot be read (Is a directory"),
-    "osm_features": Case(features.read_layers, OSM, "a.geojson", encoded(GEOJSON),
-                         "cannot be read"),
-    "mapillary": Case(mapillary.read_layers, PLAIN, "a.json", encoded(MAP_FEATURES),
-                      NO_ANSWER, NO_ANSWER, NO_ANSWER),
-    "overture": Case(overture.read_layers, OVERTURE, "a.parquet", parquet(**OVERTURE_COLUMNS),
-                     NO_GEOPARQUET, NO_GEOPARQUET, NO_GEOPARQUET),
-    "service JSON": Case(services.read_layers, PLAIN, "a.json",
-                         encoded([{"geo_point_2d": [48, 2]}]), "is not whole JSON",
-                         crs="EPSG:2154"),
-    "service GML": Case(services.read_layers, PLAIN, "a.gml", GML, "is not whole GML",
-                        crs="EPSG:2154"),
-    "service Parquet": Case(services.read_layers, PLAIN, "a.parquet", parquet(geo_shape=WKB),
-                            "is not a whole Parquet", crs="EPSG:2154"),
-}  # fmt: skip
-# The other readers read the rows before the end, or cannot detect it.
-DETECTING = {name: case for name, case in CASES.items() if case.truncated}
-# Files that a reader refuses: their name, content and the words of the error.
+# Files that a reader refuses: reader, name, content and the words of the error.
+GEOJSON = json.dumps(collection([feature(point(2, 48), BENCH)])).encode()
 REPORT = b"<ExceptionReport><ExceptionText>No.</ExceptionText></ExceptionReport>"
 TIMED_OUT = b'{"elements": [], "remark": "runtime error: Query timed out after 91 seconds."}'
-WHOLE = parquet(idbase=list(range(50)), geo_shape=WKB * 50)
-WRONG_FILES: dict[str, list[tuple[str, bytes, str]]] = {
-    "vector GeoJSON": [
-        *((f"a.{suffix}", content, f"a.{suffix}")
-          for suffix in ("fgb", "geojson", "gpkg", "json", "shp")
-          for content in (b"", b'[{"a": 1}]')),
-        # What GDAL accepts after the end, or in a member that it ignores.
-        *(("a.geojson", encoded(GEOJSON)[:-1] + b', "a": ' + damage, "download it again")
-          for damage in (b"{", b'"\x01"', b"[" * 5000)),
-        ("a.gpkg", GEOPACKAGE.replace(b"CREATE TRIGGER", b"CREATE T\xffIGGER"),
-         "a.gpkg cannot be read ("),
-    ],
-    "vector CSV": [
-        ("a.csv", content, "a.csv")
-        for content in (b"", b"\xef\xbb\xbf", b"\n\n", b"\0\1\2" * 99, bytes(range(256)))
-    ],
-    "osm_file": [
-        ("a.osm", b"", "is empty"),
-        ("a.osm", b'<osm version="0.6"><node id="1" lat="north" lon="2"/></osm>', "north"),
-    ],
-    "overpass": [
-        *(("a.json", content, NO_OVERPASS)
-          for content in (b"", b"\xff\xfe", b"null", b"[" * 100_000)),
-        ("a.json", TIMED_OUT, "is incomplete (runtime error: Query timed out"),
-    ],
-    "mapillary": [
-        ("a.json", content, NO_ANSWER)
-        for content in (b'{"data": [{"id": 1}]}', b"[]", b'{"features": [1]}', b"x")
-    ],
-    "overture": [
-        ("a.parquet", b"PAR1", NO_GEOPARQUET),
-        ("a.parquet", parquet(id=["a"], amenity=["bench"]), "not a file of Overture Maps"),
-        ("a.parquet", parquet(id=["a"], amenity=["bench"]), "its columns are id, amenity"),
-    ],
-    "service JSON": [
-        ("a.json", b"", "is empty"),
-        ("a.json", b'[{"a": 1}, {"a"', "whole JSON"),
-        ("a.json", b"[" * 100_000, "whole JSON"),
-        ("a.json", b'{"message": "no such dataset"}', "no records"),
-        ("a.json", b'{"results": 3}', "no records"),
-        ("a.json", b"[1, 2]", "no records"),
-        ("a.json", b'[{"a": "\xe9"}]', "is not UTF-8 text"),
-        ("a.csv", b"\xef\xbb\xbf \n", "is empty"),
-        ("a.csv", b"a;b\n1;2\n", "geo_point_2d"),
-        ("a.png", b"\x89PNG\r\n\x1a\n\0\0", "unknown encoding"),
-        ("a.gpkg", b"SQLite", "a.gpkg"),
-    ],
-    "service GML": [
-        ("a.gml", b"<!DOCTYPE html><html/>", "document type"),
-        ("a.gml", b"<kml/>", "has no features"),
-        ("a.gml", REPORT, "contains the error No"),
-    ],
-    "service Parquet": [
-        ("a.parquet", b"PAR1" + bytes(100), "whole Parquet"),
-        ("a.parquet", b"PAR1", "whole Parquet"),
-        ("a.parquet", WHOLE[:-40], "whole Parquet"),
-        # The metadata at the end is intact, the values are not.
-        ("a.parquet", b"PAR1" + bytes(len(WHOLE) // 3) + WHOLE[4 + len(WHOLE) // 3 :],
-         "whole Parquet"),
-    ],
-}  # fmt: skip
-
-
-@pytest.fixture(params=CASES.values(), ids=list(CASES))
-def case(request: pytest.FixtureRequest) -> Case:
-    result: Case = request.param
-    return result
-
-
-def test_file_is_read_in_its_own_crs(case: Case, tmp_path: Path) -> None:
-    path = tmp_path / case.name
-    path.write_bytes(case.content)
-    for stated, expected in ((None, "EPSG:4326"), ("EPSG:2154", case.crs)):
-        (layer,) = case.read(path, [case.spec], crs=stated)
-        assert (layer.counts.kept, len(layer.table)) == (case.rows, case.rows)
-        assert layer.table.crs == expected
-    assert case.read(path, []) == ()
-
-
-@pytest.mark.parametrize("part", [0.4, 0.9])
-@pytest.mark.parametrize("case", DETECTING.values(), ids=list(DETECTING))
-def test_truncated_file_is_refused(case: Case, tmp_path: Path, part: float) -> None:
-    path = tmp_path / case.name
-    path.write_bytes(case.content[: int(part * len(case.content))])
-    with refused(SourceError, str(path), case.truncated):
-        case.read(path, [case.spec])
-
-
-def test_absent_path_and_folder_are_refused(case: Case, tmp_path: Path) -> None:
-    with refused(SourceError, case.absent):
-        case.read(tmp_path / case.name, [case.spec])
-    (tmp_path / case.name).mkdir()
-    with refused(SourceError, case.folder):
-        case.read(tmp_path / case.name, [case.spec])
+OSM = b'<osm version="0.6"><node id="1" version="1" lat="48" lon="2"/></osm>'
+OSM_BOMB = b'<!DOCTYPE osm [<!ENTITY a "aaaa">]><osm version="0.6">&a;</osm>'
+WRONG_FILES: list[tuple[str, str, bytes, str]] = [
+    *(("vector_file", f"a.{suffix}", content, f"a.{suffix}")
+      for suffix in ("fgb", "geojson", "gpkg", "json", "shp")
+      for content in (b"", b'[{"a": 1}]')),
+    # What GDAL accepts after the end, or in a member that it ignores.
+    *(("vector_file", "a.geojson", GEOJSON[:-1] + b', "a": ' + damage, "download it again")
+      for damage in (b"{", b'"\x01"', b"[" * 5000)),
+    *(("vector_file", "a.csv", content, "a.csv")
+      for content in (b"", b"\xef\xbb\xbf", b"\n\n", b"\0\1\2" * 99, bytes(range(256)))),
+    ("osm_file", "a.osm", b"", "is empty"),
+    ("osm_file", "a.osm", b'<osm version="0.6"><node id="1" lat="north" lon="2"/></osm>', "north"),
+    *(("osm_file", f"a.osm{suffix}", content, "download it again")
+      for suffix in ("", ".gz", ".bz2", ".pbf")
+      for content in (b'{"elements": []}', b"<gpx></gpx>", OSM_BOMB)),
+    *(("osm_file", f"a.osm{suffix}", packed, "download it again")
+      for suffix, unpack in (("", bytes), (".gz", gzip.compress), (".bz2", bz2.compress))
+      for packed in (bz2.compress(OSM), gzip.compress(OSM), b"\0\0\0\x0d\x0a\x09OSMHeader")
+      if packed != unpack(OSM)),
+    *(("osm_file", f"a.osm{suffix}", OSM, "download it again") for suffix in (".bz2", ".pbf")),
+    *(("overpass", "a.json", content, NO_OVERPASS)
+      for content in (b"", b"\xff\xfe", b"null", b"[" * 100_000)),
+    ("overpass", "a.json", TIMED_OUT, "is incomplete (runtime error: Query timed out"),
+    *(("mapillary", "a.json", content, NO_ANSWER)
+      for content in (b'{"data": [{"id": 1}]}', b"[]", b'{"features": [1]}', b"x")),
+    ("overture", "a.parquet", b"PAR1", NO_GEOPARQUET),
+    ("overture", "a.parquet", parquet(id=["a"], amenity=["bench"]), "not a file of Overture Maps"),
+    ("overture", "a.parquet", parquet(id=["a"], amenity=["x"]), "its columns are id, amenity"),
+    ("opendatasoft", "a.json", b"", "is empty"),
+    ("opendatasoft", "a.json", b'[{"a": 1}, {"a"', "whole JSON"),
+    ("opendatasoft", "a.json", b"[" * 100_000, "whole JSON"),
+    ("opendatasoft", "a.json", b'{"message": "no such dataset"}', "no records"),
+    ("opendatasoft", "a.json", b'{"results": 3}', "no records"),
+    ("opendatasoft", "a.json", b"[1, 2]", "no records"),
+    ("opendatasoft", "a.json", b'[{"a": "\xe9"}]', "is not UTF-8 text"),
+    ("opendatasoft", "a.csv", b"\xef\xbb\xbf \n", "is empty"),
+    ("opendatasoft", "a.csv", b"a;b\n1;2\n", "geo_point_2d"),
+    ("opendatasoft", "a.png", b"\x89PNG\r\n\x1a\n\0\0", "unknown encoding"),
+    ("opendatasoft", "a.gpkg", b"SQLite", "a.gpkg"),
+    ("opendatasoft", "a.parquet", b"PAR1" + bytes(100), "whole Parquet"),
+    ("opendatasoft", "a.parquet", b"PAR1", "whole Parquet"),
+    ("wfs", "a.gml", b"<!DOCTYPE html><html/>", "document type"),
+    ("wfs", "a.gml", b"<kml/>", "has no features"),
+    ("wfs", "a.gml", REPORT, "contains the error No"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("key", "name", "content", "words"),
-    [(key, *wrong) for key, files in WRONG_FILES.items() for wrong in files],
+    ("engine", "wrong"),
+    [
+        (engine, wrong)
+        for wrong in WRONG_FILES
+        for engine in (ENGINES if wrong[0] == "vector_file" else ENGINES[:1])
+    ],
+    indirect=["engine"],
 )
+@pytest.mark.usefixtures("engine")
 def test_damaged_file_or_other_content_is_refused(
-    tmp_path: Path, key: str, name: str, content: bytes, words: str
+    tmp_path: Path, wrong: tuple[str, str, bytes, str]
 ) -> None:
-    path = tmp_path / name
+    name, file, content, words = wrong
+    path = tmp_path / file
     path.write_bytes(content)
     with refused(SourceError, str(path), words):
-        CASES[key].read(path, [CASES[key].spec])
-    if key.startswith("vector"):
+        reader(name)(path, [TAGGED])
+    if name == "vector_file":
         with refused(SourceError, str(path), words):
             list_layers(path)
 
 
-def test_unknown_crs_of_gml_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "a.gml"
-    path.write_bytes(CASES["service GML"].content.replace(b"<p>", b"<p srsName='EPSG:99999'>"))
+@by_each([(ENGINES[0], "GML")])
+def test_unknown_crs_of_gml_is_refused(write: Write, path: Path) -> None:
+    read = write([{"n": 1}])
+    path.write_bytes(path.read_bytes().replace(b"<place>", b"<place srsName='EPSG:99999'>"))
     with refused(CrsError, "'EPSG:99999'", "unknown"):
-        services.read_layers(path, [PLAIN])
+        read()
 
 
 # Several members in succession, so that the test compresses less.
@@ -258,7 +479,7 @@ def test_extract_with_a_high_ratio_is_refused(tmp_path: Path, suffix: str, bomb:
     path = tmp_path / f"city.osm{suffix}"
     path.write_bytes(bomb)
     with refused(SourceError, f"{path} unpacks to more than 250 times", "give what is inside"):
-        read_layers(path, [OSM])
+        read_layers(path, [TAGGED])
 
 
 def test_archive_with_a_high_ratio_is_refused(tmp_path: Path) -> None:
@@ -266,7 +487,7 @@ def test_archive_with_a_high_ratio_is_refused(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("city.csv", b" " * (HARMLESS_BYTES + 1))
     with refused(SourceError, f"city.csv in {path} unpacks to more than 250 times"):
-        read_layer(path, PLAIN)
+        read_layer(path, THINGS)
 
 
 @pytest.mark.parametrize(

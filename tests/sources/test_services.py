@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -56,7 +57,8 @@ def fetched(cache: Cache, quick: HttpSpec) -> Fetch:
     def call(service: StandIn, layer: LayerSpec = LAMPS, **options: Any) -> Download:  # noqa: ANN401
         layer = replace(layer, dataset=layer.dataset or service.dataset)
         arguments = {"endpoints": [service.endpoint], "cache": cache, "spec": quick, **options}
-        (download,) = fetch_layers(service.reader, [layer], **arguments)
+        module = import_module(f"semsig_gis.sources.readers.{service.reader}")
+        (download,) = fetch_layers(module.fetch_layer, [layer], **arguments)
         return download
 
     return call

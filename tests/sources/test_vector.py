@@ -283,17 +283,6 @@ def test_null_and_empty_geometries_are_not_errors(suffix: str, tmp_path: Path) -
     assert missing.tolist() == [False, True, True, False]
 
 
-@pytest.mark.parametrize("suffix", ["fgb", "geojson", "gpkg", "shp"])
-def test_empty_layer_is_read(suffix: str, tmp_path: Path) -> None:
-    path = tmp_path / f"things.{suffix}"
-    table = gpd.GeoDataFrame({"kind": pd.Series(dtype="str")}, geometry=[], crs="EPSG:2154")
-    pyogrio.write_dataframe(table, path, geometry_type="Point")
-    layer = read(path, rows=(1, 5))
-    assert (counts(layer), layer.notes) == ((0, 0, 0), ("the layer has no rows",))
-    assert layer.table.dtypes.to_dict() == TYPES
-    assert list_layers(path)[0].rows == 0
-
-
 def test_other_geometries_are_noted() -> None:
     layer = read(DATA / "mixed.geojson", rows=(10, 20))
     kinds = ["Point", "MultiPoint", "LineString", "Polygon", "GeometryCollection"]
@@ -514,56 +503,11 @@ def test_geojson_with_a_null_or_wrong_crs(tmp_path: Path) -> None:
         read_layer(path, spec_of(), crs="EPSG:2154")
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_where_compares_values_exactly(suffix: str, tmp_path: Path) -> None:
-    table = frame(
-        [(n, 0) for n in range(5)],
-        kind=["Tree", "tree", "Tree ", "Trees", "Tree"],
-        size=[1, 2, 3, 10, 1],
-        height=[1.0, 1.5, 2.0, 2.5, 1.0],
-    )
-    path = write(table, tmp_path, suffix)
-
-    def matching(**accepted: Any) -> int:  # noqa: ANN401 - one value or several
-        where = [(k, v if isinstance(v, tuple) else (v,)) for k, v in accepted.items()]
-        return counts(read(path, where=tuple(where), crs="EPSG:2154"))[1]
-
-    assert matching(kind=("tree", "Trees")) == 2
-    assert matching(size=1) == matching(size=1.0) == matching(size="1") == 2
-    assert matching(size=(1, 10)) == 3
-    assert matching(height=1.5) == matching(height="1.5") == 1
-    assert matching(height=1) == 2
-    assert matching(kind="Tree", size=1) == 2
-    assert matching(kind="tree", size=1) == matching(kind=1) == matching(size=True) == 0
-
-
 @pytest.mark.parametrize(("value", "filtered"), [(True, 3), ("false", 3), (1, 4)])
 def test_where_on_logical_and_missing_values(tmp_path: Path, value: Any, filtered: int) -> None:  # noqa: ANN401
     rows = [{"on": True}, {"on": False}, {"on": None}, {}]
     path = write_geojson(tmp_path, *[point(3, 43)] * 4, rows=rows)
     assert read(path, where=(("on", (value,)),)).counts.filtered == filtered
-
-
-@pytest.mark.parametrize(
-    "what",
-    [
-        {"where": (("kinds", ("a",)),)},
-        {"exclusions": (("kinds", ("a",)),)},
-        {"class_by": ClassBy("kinds", (("a", "bench"),))},
-        {"id_field": "kinds"},
-    ],
-)
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_missing_field_is_refused(suffix: str, what: dict[str, Any], tmp_path: Path) -> None:
-    path = write(frame([(1, 2)], kind=["a"], size=[1]), tmp_path, suffix)
-    (key,) = what
-    spec = spec_of(crs="EPSG:2154", **what)
-    key = "not" if key == "exclusions" else key
-    nearest = f"has no field 'kinds', which the catalogue names in {key}; the nearest is 'kind'"
-    with refused(CatalogError, f"layer 'things' ({path})", nearest, "size"):
-        read_layer(path, spec)
-    if key in {"where", "not"}:  # which needs no field if it is not applied
-        assert read_layer(path, spec, filters=False).counts.kept == 1
 
 
 def test_classes_and_identifiers(tmp_path: Path) -> None:

@@ -1,24 +1,18 @@
-"""Access token of a service: sent to that service, and removed from everything it returns."""
+"""Access token of a service: sent to that service, and hidden in messages."""
 
 from __future__ import annotations
 
 import os
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from semsig_gis.core import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-REDACTED = "(token)"
-LONGEST_SPELLING = len(r"\u007c")
 
 
 @dataclass(frozen=True, slots=True)
 class AccessToken:
-    """An access token, sent in a header of every request and never logged or cached."""
+    """An access token, sent in a header of every request and hidden in messages."""
 
     value: str = field(repr=False)
 
@@ -40,32 +34,10 @@ class AccessToken:
 
     @property
     def headers(self) -> dict[str, str]:
-        """Headers that authorize a request and ask for an uncompressed answer."""
-        return {"Authorization": f"OAuth {self.value}", "Accept-Encoding": "identity"}
+        """Headers that authorize a request."""
+        return {"Authorization": f"OAuth {self.value}"}
 
     def redact(self, text: str) -> str:
-        """Return a text without the token, however its letters are escaped."""
-        # Each letter may be as it is, in an address (%7c) or in JSON (\u007c).
-        pattern = "".join(
-            rf"(?:\\?{re.escape(letter)}|(?:%|\\u00)(?i:{ord(letter):02x}))"
-            for letter in self.value
-        )
-        return re.sub(pattern, REDACTED, text)
-
-    def redact_blocks(self, blocks: Iterable[bytes]) -> Iterator[bytes]:
-        """Remove the token from a body; it may start in one block and end in another.
-
-        Yields
-        ------
-        bytes
-            The next part of the body.
-        """
-        longest = LONGEST_SPELLING * len(self.value)
-        rest = ""
-        for block in blocks:
-            text = self.redact(rest + block.decode("latin-1"))
-            # The end may be the start of the token, so it waits for the next block.
-            ready = max(0, len(text) - longest)
-            rest = text[ready:]
-            yield text[:ready].encode("latin-1")
-        yield rest.encode("latin-1")
+        """Return a text without the token, as it is or as in an address."""
+        in_address = re.escape(quote(self.value, safe=""))
+        return re.sub(f"{re.escape(self.value)}|(?i:{in_address})", "(token)", text)

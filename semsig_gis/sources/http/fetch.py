@@ -9,12 +9,16 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import email.utils
+import functools
+import gzip
 import hashlib
 import itertools
 import math
+import threading
 import time
 import zlib
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -27,12 +31,6 @@ from semsig_gis import __version__
 from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
 from semsig_gis.sources.http.cache import FileVersion, cache_key
-from semsig_gis.sources.http.deadline import (
-    Deadline,
-    DeadlineAdapter,
-    DeadlineError,
-    SlowError,
-)
 from semsig_gis.sources.http.errors import error_text
 
 if TYPE_CHECKING:
@@ -44,24 +42,27 @@ if TYPE_CHECKING:
 
 USER_AGENT = f"semsig_gis/{__version__} (reads open data once, into a cache)"
 MAX_REDIRECTS = 5
-TOO_SLOW = "sent too slowly"
 RETRY_STATUSES = frozenset({408, 429, 500, 502, 503, 504})
 REDIRECTS = frozenset({301, 302, 303, 307, 308})
 BLOCK_BYTES = 2**16
 ANYTHING = "*/*;q=0.1"
+NOT_MODIFIED, PARTIAL, RANGE_NOT_SATISFIABLE = 304, 206, 416
+
+Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HttpSpec:
     """Settings of requests: times in seconds, sizes in bytes.
 
-    A request ends after `deadline_s`, with all redirects, attempts and pauses. `timeout` is for the
-    connection and for the next bytes; fewer than `min_bytes_per_s` over the latter count as stalled
-    and are tried `slow_attempts` times. The pause after a failure, `backoff_s`, doubles each time;
-    a server that asks for more than `longest_wait_s` is an error. `max_bytes` limits a file as sent
-    and as unpacked. A cached file that the server cannot confirm is used for `fresh_s`. `report`
-    takes a line about each pause. A server may redirect to `hosts` in addition to itself. `token`
-    authorizes every request; it is never logged or cached.
+    A request ends after `deadline_s`, with all redirects, attempts and pauses, or with the first
+    bytes that arrive after it. `timeout` is for the connection and for the next bytes; fewer than
+    `min_bytes_per_s` over the latter count as stalled and are tried `slow_attempts` times. The
+    pause after a failure, `backoff_s`, doubles each time; a server that asks for more than
+    `longest_wait_s` is an error. `max_bytes` limits a file as sent and as unpacked. A cached file
+    that the server cannot confirm is used for `fresh_s`. `report` takes a line about each pause. A
+    server may redirect to `hosts` in addition to itself. `token` authorizes every request; it is
+    hidden in messages.
     """
 
     deadline_s: float = 600.0
@@ -85,10 +86,6 @@ class HttpSpec:
             raise InputError(f"attempts is {self.attempts}; it takes at least 1.")
         if not 0 < self.deadline_s < math.inf:
             raise InputError(f"deadline_s is {self.deadline_s}; give seconds above 0.")
-
-    def deadline(self) -> Deadline:
-        """Return the deadline of a request that starts now."""
-        return Deadline(self.deadline_s, self.timeout[1], self.min_bytes_per_s)
 
 
 DEFAULT_HTTP: HttpSpec = HttpSpec()
@@ -131,48 +128,134 @@ class Request:
         return "POST" if self.data else "GET"
 
 
-@contextlib.contextmanager
-def open_session(deadline: Deadline) -> Iterator[requests.Session]:
-    """Open a session with our User-Agent that accepts only gzip and ends at a deadline."""
-    with requests.Session() as session:
-        for scheme in ("http://", "https://"):
-            session.mount(scheme, DeadlineAdapter(deadline))
-        session.headers.update({"User-Agent": USER_AGENT, "Accept-Encoding": "gzip"})
-        session.auth = lambda prepared: prepared  # no password from the user's .netrc
-        yield session
+class _Session(requests.Session):
+    """A session with our User-Agent that accepts only gzip, until the deadline of a request."""
 
+    def __init__(self, spec: HttpSpec) -> None:
+        super().__init__()
+        self.headers.update({"User-Agent": USER_AGENT, "Accept-Encoding": "gzip"})
+        self.auth = lambda prepared: prepared  # no password from the user's .netrc
+        self.spec = spec
+        self.end = time.monotonic() + spec.deadline_s
 
-@contextlib.contextmanager
-def open_response(
-    session: requests.Session, request: Request, headers: Mapping[str, str], spec: HttpSpec
-) -> Iterator[requests.Response]:
-    """Send a request, follow redirects within the host, and provide the response, body unread."""
-    url = request.url
-    params: tuple[tuple[str, str], ...] | None = request.params
-    for _ in range(MAX_REDIRECTS + 1):
-        try:
-            response = session.request(
+    @property
+    def seconds_left(self) -> float:
+        """Seconds until the deadline, 0 after it."""
+        return max(0.0, self.end - time.monotonic())
+
+    @contextlib.contextmanager
+    def response(self, request: Request, headers: Mapping[str, str]) -> Iterator[requests.Response]:
+        """Send a request, follow redirects within the host, and provide the response unread."""
+        url = request.url
+        params: tuple[tuple[str, str], ...] | None = request.params
+        connect, read = self.spec.timeout
+        for _ in range(MAX_REDIRECTS + 1):
+            left = self.seconds_left + 0.01  # a timeout of 0 is not accepted
+            send = functools.partial(
+                self.request,
                 request.method,
                 url,
                 params=params,
                 data=request.data or None,
                 headers=headers,
-                timeout=spec.timeout,
+                timeout=(min(connect, left), min(read, left)),
                 stream=True,
                 allow_redirects=False,
             )
-        except (requests.RequestException, urllib3.exceptions.HTTPError, SlowError) as error:
-            raise _connection_error(error, request.url) from error
-        with response:
-            if response.status_code not in REDIRECTS:
-                yield response
-                return
-            target = urljoin(response.url, response.headers.get("Location", ""))
-            _check_redirect(response.url, target, spec)
-            url, params = target, None
-    raise HttpError(
-        f"{host_of(request.url)} redirects too often from {request.url}; check the address."
-    )
+            try:
+                response = _call_within(self.seconds_left, send)
+            except (TimeoutError, requests.RequestException, urllib3.exceptions.HTTPError) as error:
+                raise _connection_error(error, request.url) from error
+            with response:
+                if response.status_code not in REDIRECTS:
+                    yield response
+                    return
+                target = urljoin(response.url, response.headers.get("Location", ""))
+                _check_redirect(response.url, target, self.spec)
+                url, params = target, None
+        raise HttpError(
+            f"{host_of(request.url)} redirects too often from {request.url}; check the address."
+        )
+
+    def blocks(self, response: requests.Response) -> Iterator[bytes]:
+        """Yield the body as it is sent; TransientError if the server hangs up, stops or is slow."""
+        start, size = time.monotonic(), 0
+        try:
+            while block := response.raw.read1(BLOCK_BYTES, decode_content=False):
+                yield block
+                if not self.seconds_left:
+                    raise TransientError("did not finish in time")
+                size += len(block)
+                elapsed = time.monotonic() - start
+                if elapsed >= self.spec.timeout[1]:
+                    if size < self.spec.min_bytes_per_s * elapsed:
+                        raise TransientError("sent too slowly", slow=True)
+                    start, size = time.monotonic(), 0
+        except urllib3.exceptions.ReadTimeoutError as error:
+            raise TransientError("stopped sending", slow=True) from error
+        except (urllib3.exceptions.HTTPError, OSError) as error:
+            raise TransientError("cut the connection") from error
+
+    def start_of_body(self, response: requests.Response) -> bytes:
+        """Return up to `BLOCK_BYTES` of a body, decompressed."""
+        body = bytearray()
+        for block in self.blocks(response):
+            body += block
+            if len(body) > BLOCK_BYTES:
+                break
+        if response.headers.get("Content-Encoding", "") == "gzip":
+            with contextlib.suppress(zlib.error):
+                return zlib.decompressobj(wbits=31).decompress(body, BLOCK_BYTES)
+        return bytes(body[:BLOCK_BYTES])
+
+    def check_status(self, response: requests.Response) -> None:
+        """Raise HttpError if a response is not a file or a part of it; TransientError to retry."""
+        status = response.status_code
+        if status in {requests.codes.ok, requests.codes.partial}:
+            return
+        what = f"answered {status} {response.reason or ''}".rstrip()
+        if status in RETRY_STATUSES:
+            retry_after = response.headers.get("Retry-After", "").strip()
+            wait = float(retry_after) if retry_after.isdecimal() else None
+            if wait is None:
+                with contextlib.suppress(ValueError):  # a date, or no time at all
+                    date = email.utils.parsedate_to_datetime(retry_after).astimezone(UTC)
+                    wait = max(0.0, (date - datetime.now(UTC)).total_seconds())
+            raise TransientError(what, status, wait)
+        # The error message of the service, if the body contains one.
+        text = ""
+        with contextlib.suppress(TransientError):
+            text = error_text(self.start_of_body(response))
+        detail = f" ({text})" if text else ""
+        address = response.url.partition("?")[0]
+        msg = f"{host_of(response.url)} {what} to {address}{detail}; correct it."
+        raise HttpError(msg, status)
+
+
+def _call_within(seconds: float, send: Callable[[], requests.Response]) -> requests.Response:
+    """Send a request in a thread; TimeoutError if the headers of its response take too long.
+
+    The timeout of a socket starts again with every byte of the headers.
+    """
+    result: Future[requests.Response] = Future()
+
+    def run() -> None:
+        try:
+            result.set_result(send())
+        except Exception as error:  # noqa: BLE001 - raised in the other thread
+            result.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    try:
+        return result.result(timeout=seconds)
+    except TimeoutError:
+        result.add_done_callback(_close)
+        raise
+
+
+def _close(late: Future[requests.Response]) -> None:
+    if late.exception() is None:
+        late.result().close()
 
 
 def _check_redirect(source: str, target: str, spec: HttpSpec) -> None:
@@ -198,65 +281,12 @@ def _connection_error(error: Exception, url: str) -> Exception:
     if isinstance(error, requests.exceptions.SSLError):
         msg = f"{host_of(url)} has no certificate that this machine trusts; check the address."
         return HttpError(msg)
-    if isinstance(error, SlowError):
-        return TransientError(TOO_SLOW, slow=True)
-    if isinstance(error, requests.exceptions.ConnectTimeout | requests.exceptions.ReadTimeout):
+    if isinstance(error, TimeoutError | requests.exceptions.Timeout):
         return TransientError("did not answer in time", slow=True)
     if isinstance(error, requests.exceptions.ConnectionError):
         return TransientError("could not be reached or hung up")
     msg = f"{url} cannot be requested ({' '.join(str(error).split()).rstrip('.')}); correct it."
     return HttpError(msg)
-
-
-def check_status(response: requests.Response) -> None:
-    """Raise HttpError if a response is not a file or a part of it; TransientError to retry."""
-    status = response.status_code
-    if status in {requests.codes.ok, requests.codes.partial}:
-        return
-    what = f"answered {status} {response.reason or ''}".rstrip()
-    if status in RETRY_STATUSES:
-        retry_after = response.headers.get("Retry-After", "").strip()
-        wait = float(retry_after) if retry_after.isdecimal() else None
-        if wait is None:
-            with contextlib.suppress(ValueError):  # a date, or no time at all
-                date = email.utils.parsedate_to_datetime(retry_after).astimezone(UTC)
-                wait = max(0.0, (date - datetime.now(UTC)).total_seconds())
-        raise TransientError(what, status, wait)
-    # The error message of the service, if the body contains one.
-    body, text = bytearray(), ""
-    with contextlib.suppress(TransientError):
-        _read_start(response, body)
-    with contextlib.suppress(zlib.error):
-        packed = response.headers.get("Content-Encoding", "") == "gzip"
-        text = error_text(
-            zlib.decompressobj(wbits=31).decompress(body, BLOCK_BYTES) if packed else body
-        )
-    detail = f" ({text})" if text else ""
-    raise HttpError(
-        f"{host_of(response.url)} {what} to {response.url.partition('?')[0]}{detail}; correct it.",
-        status,
-    )
-
-
-def _read_start(response: requests.Response, body: bytearray) -> None:
-    """Append a little more than the first `BLOCK_BYTES` of a response to `body`."""
-    for block in raw_blocks(response):
-        body += block
-        if len(body) > BLOCK_BYTES:
-            break
-
-
-def raw_blocks(response: requests.Response) -> Iterator[bytes]:
-    """Yield the body as it is sent; TransientError if the server hangs up, stops or is slow."""
-    try:
-        while block := response.raw.read1(BLOCK_BYTES, decode_content=False):
-            yield block
-    except SlowError as error:
-        raise TransientError(TOO_SLOW, slow=True) from error
-    except urllib3.exceptions.ReadTimeoutError as error:
-        raise TransientError("stopped sending", slow=True) from error
-    except (urllib3.exceptions.HTTPError, OSError) as error:
-        raise TransientError("cut the connection") from error
 
 
 def check_url(url: str) -> None:
@@ -275,11 +305,6 @@ def check_url(url: str) -> None:
 def host_of(url: str) -> str:
     """Return the host of an address, with its port if there is one."""
     return urlsplit(url).netloc
-
-
-Progress = Callable[[int, int], None]
-
-NOT_MODIFIED, PARTIAL, RANGE_NOT_SATISFIABLE = 304, 206, 416
 
 
 class TooLargeError(SourceError):
@@ -329,13 +354,13 @@ def fetch(
         download = _Download(request, entry, cached, spec, accept, suffix, check, progress)
         try:
             return download.run(before)
-        except HttpError as error:
+        except SourceError as error:
+            if isinstance(error, TooLargeError):
+                entry.drop_part()
             if spec.token is None:
                 raise
-            raise HttpError(spec.token.redact(str(error)), error.status) from None
-        except TooLargeError:
-            entry.drop_part()
-            raise
+            error.args = (spec.token.redact(str(error)),)
+            raise error from None
         except OSError as error:
             raise InputError(
                 f"cache folder {cache.folder} cannot be written ({error.strerror or error}); "
@@ -358,19 +383,12 @@ def cached_file(cache: Cache, key: str, *, what: str) -> Fetched:
 def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
     """Request a short text once, without the cache, and return up to 64 KiB of it."""
     check_url(url)
-    request, body = Request(url), bytearray()
     try:
-        with (
-            open_session(spec.deadline()) as session,
-            open_response(session, request, {}, spec) as response,
-        ):
-            check_status(response)
-            _read_start(response, body)
-    except DeadlineError as error:
-        raise _deadline_error(url, spec) from error
+        with _Session(spec) as session, session.response(Request(url), {}) as response:
+            session.check_status(response)
+            return session.start_of_body(response).decode("utf-8", errors="replace")
     except TransientError as error:
         raise HttpError(f"{host_of(url)} {error}; try again later.", error.status) from error
-    return body[:BLOCK_BYTES].decode("utf-8", errors="replace")
 
 
 # --- One file, several attempts -----------------------------------------------------------------
@@ -397,8 +415,7 @@ class _Download:
     def run(self, before: Callable[[], None] | None) -> Fetched:
         """Try until the file is complete, the attempts are used up or the time is over."""
         spec = self.spec
-        deadline = spec.deadline()
-        with open_session(deadline) as session:
+        with _Session(spec) as session:
             for attempt in itertools.count(1):
                 if before is not None:
                     before()
@@ -406,34 +423,36 @@ class _Download:
                     return self.attempt(session)
                 except TransientError as error:
                     failure = error
-                except DeadlineError as error:
-                    raise _deadline_error(self.request.url, spec, self.entry) from error
                 if failure.wait is not None and failure.wait > spec.longest_wait_s:
                     remedy = f" and asks to wait {failure.wait:.0f} s; try again after that"
+                    break
+                pause = (
+                    spec.backoff_s * 2 ** (attempt - 1) if failure.wait is None else failure.wait
+                )
+                if pause >= session.seconds_left:
+                    resumed = self.entry.resumable()[0] > 0
+                    action = "run it again to go on from there" if resumed else "ask for less"
+                    remedy = (
+                        f", and {spec.deadline_s:g} s are over; {action}, or allow more time with "
+                        "--timeout"
+                    )
                     break
                 most = min(spec.attempts, spec.slow_attempts) if failure.slow else spec.attempts
                 if attempt >= most:
                     remedy = f", {attempt} times; try again later"
                     break
-                pause = (
-                    spec.backoff_s * 2 ** (attempt - 1) if failure.wait is None else failure.wait
-                )
-                if pause >= deadline.seconds_left:
-                    remedy = f", and {spec.deadline_s:g} s are over; try again later"
-                    break
-                spec.report(
-                    f"{self.host} {failure}; attempt {attempt + 1} of {most} in {pause:.0f} s"
-                )
+                line = f"{self.host} {failure}; attempt {attempt + 1} of {most} in {pause:.0f} s"
+                spec.report(line if spec.token is None else spec.token.redact(line))
                 spec.sleep(pause)
         if self.cached is not None:
             remedy += f", or work offline with the copy of {self.cached.fetched_at} in the cache"
         raise HttpError(f"{self.host} {failure}{remedy}.", failure.status) from failure
 
-    def attempt(self, session: requests.Session) -> Fetched:
+    def attempt(self, session: _Session) -> Fetched:
         """Request the file once, or the rest of it; return it from the cache."""
         request, entry, spec = self.request, self.entry, self.spec
         offset, part_version, headers = self.range_and_headers()
-        with open_response(session, request, headers, spec) as response:
+        with session.response(request, headers) as response:
             if response.status_code == NOT_MODIFIED and self.cached is not None:
                 entry.drop_part()
                 return self.cached
@@ -448,16 +467,21 @@ class _Download:
                     raise TransientError(
                         "sent another part of the file than the one asked for", wait=0.0
                     )
-            check_status(response)
+            session.check_status(response)
             version = part_version if offset else FileVersion.from_headers(response.headers)
             if self.accept and version.content_type and version.content_type not in self.accept:
                 raise SourceError(
                     f"{self.host} sent {version.content_type} where "
                     f"{' or '.join(self.accept)} was expected; check the address {request.url}."
                 )
+            if version.encoding not in {"", "gzip", "x-gzip"}:
+                raise SourceError(
+                    f"{self.host} sent the unsupported Content-Encoding {version.encoding}; "
+                    "report it to the service."
+                )
             if not offset:
                 entry.start_part(version)
-            self.receive(response, offset)
+            self.receive(session, response, offset)
             url = response.url if spec.token is None else spec.token.redact(response.url)
         body = entry.temporary_path(self.suffix)
         try:
@@ -472,34 +496,25 @@ class _Download:
 
     def range_and_headers(self) -> tuple[int, FileVersion, dict[str, str]]:
         """Return the size and version of the part to resume, and the headers to send."""
-        token, is_get = self.spec.token, self.request.method == "GET"
-        # The token is removed from a body, so a part has another length than on the server.
-        resumable = is_get and token is None
-        offset, version = self.entry.resumable() if resumable else (0, FileVersion())
+        is_get = self.request.method == "GET"
+        offset, version = self.entry.resumable() if is_get else (0, FileVersion())
         headers = self.cached.condition if self.cached and is_get else {}
         if self.accept:
             headers |= {"Accept": ", ".join((*self.accept, ANYTHING))}
-        if token is not None:
-            headers |= token.headers
+        if self.spec.token is not None:
+            headers |= self.spec.token.headers
         if offset:
             headers |= {"Range": f"bytes={offset}-", "If-Range": version.if_range}
         return offset, version, headers
 
-    def receive(self, response: requests.Response, offset: int) -> None:
+    def receive(self, session: _Session, response: requests.Response, offset: int) -> None:
         """Append the body of a response to the part, within the size limit."""
         length = response.headers.get("Content-Length", "")
         size = offset
         total = offset + int(length) if length.isdecimal() else 0
         self.check_size(total)
-        blocks = raw_blocks(response)
-        if self.spec.token is not None:
-            if FileVersion.from_headers(response.headers).encoding:
-                raise HttpError(
-                    f"{self.host} sent a compressed answer although none was requested."
-                )
-            blocks = self.spec.token.redact_blocks(blocks)
         with self.entry.part.open("ab") as stream:
-            for block in blocks:
+            for block in session.blocks(response):
                 size += len(block)
                 self.check_size(size)
                 stream.write(block)
@@ -508,18 +523,24 @@ class _Download:
 
     def unpack(self, body: Path, encoding: str) -> str:
         """Decompress the part into a body; return its checksum."""
-        digest = hashlib.sha256()
-        size = 0
-        with self.entry.part.open("rb") as packed, body.open("wb") as stream:
-            for block in _unpacked(packed.read, encoding, self.host):
-                size += len(block)
-                self.check_size(size)
-                if ratio_too_high(packed.tell(), size):
-                    raise decompression_bomb_error(
-                        f"what {self.host} sends", "report it to the publisher"
-                    )
-                digest.update(block)
-                stream.write(block)
+        digest, size, part = hashlib.sha256(), 0, self.entry.part
+        packed_size = part.stat().st_size
+        try:
+            with (
+                gzip.open(part) if encoding else part.open("rb") as packed,
+                body.open("wb") as stream,
+            ):
+                while block := packed.read(BLOCK_BYTES):
+                    size += len(block)
+                    self.check_size(size)
+                    if ratio_too_high(packed_size, size):
+                        raise decompression_bomb_error(
+                            f"what {self.host} sends", "report it to the publisher"
+                        )
+                    digest.update(block)
+                    stream.write(block)
+        except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+            raise TransientError("sent a damaged gzip body") from error
         return digest.hexdigest()
 
     def check_size(self, size: int) -> None:
@@ -529,38 +550,6 @@ class _Download:
                 f"{self.host} sends more than the {self.spec.max_bytes:,} bytes that are "
                 "accepted; ask for a smaller area or for fewer layers."
             )
-
-
-def _deadline_error(url: str, spec: HttpSpec, entry: CacheEntry | None = None) -> HttpError:
-    """Return the error for a request that is over its deadline."""
-    resumed = entry is not None and entry.resumable()[0] > 0
-    remedy = "run it again to go on from there" if resumed else "ask for less"
-    return HttpError(
-        f"{host_of(url)} was not done after {spec.deadline_s:g} s; {remedy}, or allow more time "
-        "with --timeout."
-    )
-
-
-def _unpacked(read: Callable[[int], bytes], encoding: str, host: str) -> Iterator[bytes]:
-    """Read a response body and yield it, decompressed if needed, in blocks of limited size."""
-    if not encoding:
-        while block := read(BLOCK_BYTES):
-            yield block
-        return
-    if encoding not in {"gzip", "x-gzip"}:
-        raise SourceError(
-            f"{host} sent the unsupported Content-Encoding {encoding}; report it to the service."
-        )
-    unzip = zlib.decompressobj(wbits=31)
-    try:
-        while packed := unzip.unconsumed_tail or unzip.unused_data or read(BLOCK_BYTES):
-            if unzip.eof:  # a gzip body may have several members
-                unzip = zlib.decompressobj(wbits=31)
-            yield unzip.decompress(packed, BLOCK_BYTES)
-    except zlib.error as error:
-        raise TransientError("sent a damaged gzip body") from error
-    if not unzip.eof:
-        raise TransientError("sent a gzip body without its end")
 
 
 def _pairs(items: Mapping[str, str | float] | None) -> tuple[tuple[str, str], ...]:

@@ -3,35 +3,53 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError
-from semsig_gis.sources.services import arcgis, ckan, ogc_features, opendatasoft, socrata, wfs
+from semsig_gis.sources.http.fetch import DEFAULT_HTTP
+from semsig_gis.sources.registry import READERS, Source
+from semsig_gis.sources.services.layers import read_layers
 from semsig_gis.sources.services.pages import Client, PagingError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec, Progress
+    from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.services.layers import Download
 
-# The function that fetches a layer, by the name of the catalogue's reader.
-SERVICES = {
-    "arcgis": arcgis.fetch_layer,
-    "ckan": ckan.fetch_layer,
-    "ogc_features": ogc_features.fetch_layer,
-    "opendatasoft": opendatasoft.fetch_layer,
-    "socrata": socrata.fetch_layer,
-    "wfs": wfs.fetch_layer,
-}
+    FetchLayer = Callable[[Client, Area | None], Download]
+
+
+def service(fetch_layer: FetchLayer) -> FetchLayer:
+    """Register a service by the function that fetches one of its layers; a decorator."""
+
+    def fetch(
+        specs: Sequence[LayerSpec],
+        *,
+        filters: bool,
+        **request: Any,  # noqa: ANN401 - see `Source`
+    ) -> Iterator[tuple[RawLayer, str]]:
+        for download in fetch_layers(fetch_layer, specs, **request):
+            layer = download.read(filters=filters)
+            from_cache = all(file.from_cache for file in download.files)
+            text = (
+                f"{layer.counts.read:,} rows, "
+                f"{sum(file.bytes for file in download.files) / 1e6:.2f} MB, "
+                f"from {'the cache' if from_cache else 'the portal'}, "
+                f"fetched {min(file.fetched_at for file in download.files)}"
+            )
+            yield layer, text
+
+    READERS.register(Source(read=read_layers, fetch=fetch), fetch_layer.__module__)
+    return fetch_layer
 
 
 def fetch_layers(
-    name: str,
+    fetch_layer: FetchLayer,
     specs: Sequence[LayerSpec],
     *,
     endpoints: Sequence[str],
@@ -40,7 +58,7 @@ def fetch_layers(
     spec: HttpSpec = DEFAULT_HTTP,
     progress: Progress | None = None,
 ) -> list[Download]:
-    """Fetch layers from a service by the name of its reader; the first endpoint is its address.
+    """Fetch layers from a service; the first endpoint is its address.
 
     Layers without a dataset are skipped, because the service does not have them. CatalogError if
     the service lacks a dataset or field of the catalogue, SourceError if a request fails or the
@@ -52,14 +70,11 @@ def fetch_layers(
             continue
         client = Client(layer=layer, endpoints=endpoints, cache=cache, spec=spec, progress=progress)
         try:
-            download = SERVICES[name](client, area)
-            downloads.append(dataclasses.replace(download, area=area))
+            downloads.append(dataclasses.replace(fetch_layer(client, area), area=area))
         except SourceError as error:
             if isinstance(error, PagingError):  # the cached pages do not belong together
                 for file in client.requested_files:
                     cache.forget(file)
-            message = f"layer {layer.name!r}: {error}"
-            if isinstance(error, HttpError):
-                raise HttpError(message, error.status) from error
-            raise type(error)(message) from error
+            error.args = (f"layer {layer.name!r}: {error}",)
+            raise
     return downloads

@@ -359,7 +359,7 @@ def read_format(form: str, folder: Path) -> AnnotatedPicture:
 
 
 def test_every_format_has_sample() -> None:
-    assert {form.partition(" (")[0] for form in SAMPLES} == {form.NAME for form in FORMATS}
+    assert {form.partition(" (")[0] for form in SAMPLES} == {form.name for form in FORMATS.values()}
 
 
 @pytest.mark.parametrize("form", SAMPLES)

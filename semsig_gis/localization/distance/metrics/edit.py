@@ -16,6 +16,7 @@ from rapidfuzz.process import cdist
 
 from semsig_gis.core import InputError
 from semsig_gis.database import checked_sequence
+from semsig_gis.localization.distance.metrics import METRICS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -140,6 +141,7 @@ class EditWeights:
                 )
 
 
+@METRICS.register
 def distances(
     queries: Sequence[NDArray[np.uint8]],
     table: SequenceTable,

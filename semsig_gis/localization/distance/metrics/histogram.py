@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.database import checked_sequence
+from semsig_gis.localization.distance.metrics import METRICS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import SequenceTable
 
 
+@METRICS.register
 def distances(
     queries: Sequence[NDArray[np.uint8]],
     table: SequenceTable,

@@ -1,55 +1,57 @@
 """Formats of detections: files with the boxes of objects in pictures.
 
-Each module of this package is a format: its ``NAME``, the ``SUFFIX`` of its files, a function
-``matches`` that recognizes their content, and a function ``pictures`` that reads them. To add one,
+Each module of this package is a format, registered by the decorator `detection_format`. To add one,
 add its module: `read_pictures`, messages and the tests in
 ``tests/observation/detectors/test_formats.py`` find it.
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import Any
 
-from semsig_gis.core import InputError
+from semsig_gis.core import InputError, Registry
 from semsig_gis.observation.detectors.documents import INVALID, PARSERS, Document, read_document
+from semsig_gis.observation.detectors.pictures import AnnotatedPicture
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from semsig_gis.observation.detectors.pictures import AnnotatedPicture
+Pictures = Callable[[Document, Sequence[Document]], Iterable[AnnotatedPicture]]
 
 
-class Format(Protocol):
-    """What the module of a format contains."""
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format of files with the suffix `suffix`; its `name` is for messages.
 
-    NAME: str
-    SUFFIX: str
+    `matches` is whether the content of such a file (JSON, XML, CSV or words of lines) is in the
+    format. `pictures` returns the pictures of a file, given all files; an error about a missing key
+    or a wrong type becomes an InputError.
+    """
 
-    def matches(self, content: Any, /) -> bool:  # noqa: ANN401 - any JSON, XML, CSV or text
-        """Return whether the content of a file, with the suffix of the format, is in it."""
-
-    def pictures(
-        self, document: Document, documents: Sequence[Document], /
-    ) -> Iterable[AnnotatedPicture]:
-        """Return the pictures of a file; `documents` are all files that were given.
-
-        An error about a missing key or a wrong type becomes an InputError.
-        """
+    name: str
+    suffix: str
+    matches: Callable[[Any], bool]
+    pictures: Pictures
 
 
-FORMATS: tuple[Format, ...] = tuple(
-    cast("Format", importlib.import_module(f"{__name__}.{module.name}"))
-    for module in pkgutil.iter_modules(__path__)
-)
+FORMATS: Registry[Format] = Registry("format", __name__, __path__)
 """Every format, by the name of its module."""
+
+
+def detection_format(
+    name: str, suffix: str, matches: Callable[[Any], bool]
+) -> Callable[[Pictures], Pictures]:
+    """Return a decorator that registers a function `Format.pictures` as a format."""
+
+    def register(pictures: Pictures) -> Pictures:
+        FORMATS.register(Format(name, suffix, matches, pictures), pictures.__module__)
+        return pictures
+
+    return register
+
 
 NAME_SUFFIXES = frozenset({".yaml", ".yml", ".names"})
 NAME_FILES = frozenset({"classes.txt"})
-ACCEPTED = f"give {', '.join(form.NAME for form in FORMATS)}, or a folder of them"
 
 
 def read_pictures(
@@ -71,7 +73,9 @@ def read_pictures(
             inside = [read_document(file) for file in _files_in(path)]
             labels = [document for document in inside if _format(document)]
             if not labels:
-                raise InputError(f"the folder {path} contains no file of detections; {ACCEPTED}.")
+                raise InputError(
+                    f"the folder {path} contains no file of detections; {_accepted()}."
+                )
             documents += labels
             unknown += [document.file for document in inside if not _format(document)]
         elif _has_class_names(path):
@@ -79,16 +83,20 @@ def read_pictures(
         elif path.suffix.lower() in PARSERS:
             documents.append(read_document(path))
         else:
-            raise InputError(f"{path} is not in a supported format; {ACCEPTED}.")
+            raise InputError(f"{path} is not in a supported format; {_accepted()}.")
     labels = [document for document in documents if not _has_class_names(document.file)]
     return [picture for document in labels for picture in _pictures(document, documents)], unknown
+
+
+def _accepted() -> str:
+    return f"give {', '.join(form.name for form in FORMATS.values())}, or a folder of them"
 
 
 def _pictures(document: Document, documents: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the pictures of a file of labels; InputError if it is in no format."""
     file, form = document.file, _format(document)
     if form is None:
-        raise InputError(f"{file} contains no detections in a known format; {ACCEPTED}.")
+        raise InputError(f"{file} contains no detections in a known format; {_accepted()}.")
     try:
         pictures = form.pictures(document, documents)
         return [replace(picture, folder=file.parent) for picture in pictures]
@@ -97,7 +105,7 @@ def _pictures(document: Document, documents: Sequence[Document]) -> list[Annotat
             raise
         lacks = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
         raise InputError(
-            f"{file} does not follow its format, {form.NAME} ({lacks}); export it again."
+            f"{file} does not follow its format, {form.name} ({lacks}); export it again."
         ) from error
 
 
@@ -120,5 +128,5 @@ def _has_class_names(file: Path) -> bool:
 def _format(document: Document) -> Format | None:
     """Return the format of a document by its suffix and content."""
     suffix = document.file.suffix.lower()
-    fitting = (form for form in FORMATS if suffix == form.SUFFIX)
+    fitting = (form for form in FORMATS.values() if suffix == form.suffix)
     return next((form for form in fitting if form.matches(document.content)), None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     Shot,
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Corners
 
-NAME, SUFFIX = "BDD100K", ".json"
 HIDDEN = ("occluded", "truncated")
 CORNERS = ("x1", "y1", "x2", "y2")
 
@@ -31,6 +31,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
     )
 
 
+@detection_format("BDD100K", ".json", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture of each frame; lines, and labels of several objects, are counted."""
     content = document.content

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import InputError
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     Shot,
@@ -19,14 +20,13 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Box, Corners
 
-NAME, SUFFIX = "COCO", ".json"
-
 
 def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
     """Return whether JSON is from COCO."""
     return _is_coco(content) or _is_results(content)
 
 
+@detection_format("COCO", ".json", matches)
 def pictures(document: Document, documents: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the pictures; those of the first annotations are left to the results, if any."""
     content, source = document.content, str(document.file)

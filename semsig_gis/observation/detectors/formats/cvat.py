@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import InputError
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     Shot,
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.observation.detectors.documents import Document
 
-NAME, SUFFIX = "CVAT for images", ".xml"
 CORNERS = ("xtl", "ytl", "xbr", "ybr")
 
 
@@ -29,6 +29,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - an XML element
     return bool(content.tag == "annotations")
 
 
+@detection_format("CVAT for images", ".xml", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the pictures; InputError for tracks of a video."""
     if document.content.find("track") is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import InputError
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, box_of
 
 if TYPE_CHECKING:
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.observation.detectors.documents import Document
 
-NAME, SUFFIX = "KITTI label_2", ".txt"
 VALUES = 15  # type, truncated, occluded, angle, box, and seven of the object in space; a score
 REGION = "DontCare"  # several objects that were not labelled
 
@@ -23,6 +23,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
     return len(words) in {VALUES, VALUES + 1} and not words[0].isdecimal()
 
 
+@detection_format("KITTI label_2", ".txt", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture that is named as the file."""
     boxes, others = [], 0

@@ -7,6 +7,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     Shot,
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Box, Corners
 
-NAME, SUFFIX = "Label Studio", ".json"
 PERCENT = 100.0
 
 
@@ -35,6 +35,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
     )
 
 
+@detection_format("Label Studio", ".json", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture of each task."""
     return [_picture(task, str(document.file)) for task in document.content]

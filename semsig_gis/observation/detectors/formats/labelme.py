@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     Shot,
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.observation.detectors.documents import Document
 
-NAME, SUFFIX = "LabelMe", ".json"
 OUTLINES = frozenset({"polygon", "rectangle", "rotation", "mask", "circle"})
 
 
@@ -27,6 +27,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
     return isinstance(content, dict) and {"shapes", "imagePath"} <= content.keys()
 
 
+@detection_format("LabelMe", ".json", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture; points and lines are counted."""
     content = document.content

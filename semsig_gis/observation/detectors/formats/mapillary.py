@@ -7,6 +7,7 @@ import binascii
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import InputError
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, Shot, bounds, box_of
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Corners
 
-NAME, SUFFIX = "Mapillary", ".json"
 
 CAMERAS: dict[str, Projection] = {
     "perspective": "pinhole",
@@ -40,6 +40,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
     return _images(content) is not None
 
 
+@detection_format("Mapillary", ".json", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the pictures with camera, heading and position."""
     images = _images(document.content) or []

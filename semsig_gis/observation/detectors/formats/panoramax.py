@@ -7,6 +7,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import FULL_TURN, UnknownNameError
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     Shot,
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.observation.detectors.documents import Document
 
-NAME, SUFFIX = "Panoramax", ".json"
 COMPASS_ERROR = 10.0
 """Standard deviation in degrees of headings from a compass or from the path of the camera."""
 
@@ -41,6 +41,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
     )
 
 
+@detection_format("Panoramax", ".json", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the pictures with camera and heading; annotations without a tag are counted."""
     return [_picture(item, str(document.file)) for item in _items(document.content)]

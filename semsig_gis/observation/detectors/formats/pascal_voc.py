@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, Shot, box_of, size_of
 
 if TYPE_CHECKING:
@@ -11,7 +12,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.observation.detectors.documents import Document
 
-NAME, SUFFIX = "Pascal VOC", ".xml"
 CORNERS = ("xmin", "ymin", "xmax", "ymax")
 PARTLY_HIDDEN = ("truncated", "occluded")
 
@@ -21,6 +21,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - an XML element
     return bool(content.tag == "annotation")
 
 
+@detection_format("Pascal VOC", ".xml", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture; objects with a mask or a rotated box only are counted."""
     root = document.content

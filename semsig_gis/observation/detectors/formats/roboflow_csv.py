@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, Shot, box_of, size_of
 
 if TYPE_CHECKING:
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Box
 
-NAME, SUFFIX = "CSV of Roboflow", ".csv"
 CORNERS = ("xmin", "ymin", "xmax", "ymax")
 
 
@@ -22,6 +22,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - rows of CSV
     return isinstance(names, dict) and {"filename", "class", *CORNERS} <= names.keys()
 
 
+@detection_format("CSV of Roboflow", ".csv", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture of each file name."""
     boxes: dict[str, list[Box]] = {}

@@ -7,6 +7,7 @@ import struct
 import zlib
 from typing import TYPE_CHECKING, Any
 
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     Shot,
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Corners
 
-NAME, SUFFIX = "Supervisely", ".json"
 OUTLINES = frozenset({"rectangle", "polygon"})
 PARTLY_HIDDEN = frozenset({"truncated", "occluded"})
 PNG_SIZE = slice(16, 24)  # of the header of a PNG
@@ -32,6 +32,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
     return isinstance(content, dict) and {"objects", "size"} <= content.keys()
 
 
+@detection_format("Supervisely", ".json", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture, named by the file; points and lines are counted."""
     content = document.content

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, bounds, box_of
 
 if TYPE_CHECKING:
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Corners
 
-NAME, SUFFIX = "VIA", ".json"
 PROJECT = "_via_img_metadata"
 LABELS = ("label", "class", "name", "type", "category", "object")
 """Usual names of the attribute that is the label, best first; otherwise the first attribute."""
@@ -28,6 +28,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
     )
 
 
+@detection_format("VIA", ".json", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the pictures, without sizes; points and lines are counted."""
     images = document.content.get(PROJECT, document.content)

@@ -8,6 +8,7 @@ import yaml
 
 from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.documents import INVALID, text_of
+from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, bounds, box_of
 from semsig_gis.storage import parse_json
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Corners
 
-NAME, SUFFIX = "YOLO with data.yaml", ".txt"
 NAME_FILES = ("data.yaml", "data.yml", "classes.txt", "obj.names")
 """Files with class names, in the folder of the labels or up to two above."""
 LEVELS = 3
@@ -41,6 +41,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
     )
 
 
+@detection_format("YOLO with data.yaml", ".txt", matches)
 def pictures(document: Document, documents: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture that is named as the file."""
     file = document.file

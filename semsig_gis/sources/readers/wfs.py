@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources.http.fetch import host_of
+from semsig_gis.sources.services.fetch import service
 from semsig_gis.sources.services.gml import ID, features, local_name
 from semsig_gis.sources.services.layers import Download, find_field
 from semsig_gis.sources.services.pages import (
@@ -89,6 +90,7 @@ class _Capabilities:
         return self.constraints.get(name, "").upper() == "FALSE"
 
 
+@service
 def fetch_layer(client: Client, area: Area | None) -> Download:
     """Fetch a feature type in WGS 84; the catalogue may omit the namespace prefix of its name.
 

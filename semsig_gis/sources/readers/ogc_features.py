@@ -7,6 +7,7 @@ from urllib.parse import quote, urljoin
 
 from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError, host_of
+from semsig_gis.sources.services.fetch import service
 from semsig_gis.sources.services.gml import ID
 from semsig_gis.sources.services.layers import Download
 from semsig_gis.sources.services.pages import NOT_FOUND, ServiceQuery, geojson_page
@@ -23,6 +24,7 @@ CORE, FILTER = "ogcapi-features-1", "ogcapi-features-3/1.0/conf/features-filter"
 QUERYABLES = "http://www.opengis.net/def/rel/ogc/1.0/queryables"
 
 
+@service
 def fetch_layer(client: Client, area: Area | None) -> Download:
     """Fetch a collection in WGS 84, longitude first.
 

@@ -8,6 +8,7 @@ from urllib.parse import quote
 import shapely
 
 from semsig_gis.core import CatalogError, SourceError
+from semsig_gis.sources.services.fetch import service
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field
 from semsig_gis.sources.services.pages import ServiceQuery
 from semsig_gis.storage import parse_json
@@ -26,6 +27,7 @@ LONGEST_OUTLINE = 2_000
 GEOJSON = ("application/geo+json", "application/vnd.geo+json", "application/json")
 
 
+@service
 def fetch_layer(client: Client, area: Area | None) -> Download:
     """Fetch a dataset from a portal as one file.
 

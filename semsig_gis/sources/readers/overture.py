@@ -22,6 +22,7 @@ from semsig_gis.sources.filters import ANY_VALUE, as_text
 from semsig_gis.sources.http.cache import cache_key, checksum
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, cached_file
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex
+from semsig_gis.sources.registry import READERS, Source, fetch_by_tiles
 from semsig_gis.storage import groups_meeting, parse_json
 
 if TYPE_CHECKING:
@@ -348,3 +349,7 @@ def _latest(system: fs.FileSystem, folder: str) -> str:
     if not names:
         raise FileNotFoundError("it contains nothing")
     return folder if any(PARTITION.search(Path(name).name) for name in names) else names[-1]
+
+
+FETCH = fetch_by_tiles(fetch_layers, read_layers)
+READERS.register(Source(read=read_layers, fetch=FETCH, merging=True, pruning=True), __name__)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from semsig_gis.core import SourceError
 from semsig_gis.sources.area import fetch_tiles, tiles_of
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch, host_of
+from semsig_gis.sources.registry import READERS, Source, fetch_by_tiles
 from semsig_gis.sources.rows import WGS84, RowRules, Rows, choose_crs, raw_layer
 from semsig_gis.storage import parse_json
 
@@ -137,3 +138,7 @@ def fetch_layers(
 
     tiles = tiles_of(area, TILE_DEG, remedy="give a smaller one")
     return fetch_tiles(tiles, area, fetch_tile, progress)
+
+
+FETCH = fetch_by_tiles(fetch_layers, read_layers)
+READERS.register(Source(read=read_layers, fetch=FETCH, merging=True), __name__)

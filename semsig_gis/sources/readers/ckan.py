@@ -10,6 +10,7 @@ from urllib.parse import unquote, urljoin, urlsplit
 from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError, host_of
 from semsig_gis.sources.paths import matches_pattern
+from semsig_gis.sources.services.fetch import service
 from semsig_gis.sources.services.layers import Download, PositionReader
 from semsig_gis.sources.services.pages import (
     HTML,
@@ -50,6 +51,7 @@ FORMATS = {
 TABLES = frozenset({".csv", ".json", ""})
 
 
+@service
 def fetch_layer(client: Client, area: Area | None) -> Download:  # noqa: ARG001 - not in CKAN
     """Fetch a dataset by its name: rows of the datastore, or the file of a resource.
 

@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError, host_of
+from semsig_gis.sources.services.fetch import service
 from semsig_gis.sources.services.layers import Download
 from semsig_gis.sources.services.pages import ServiceQuery, geojson_page
 
@@ -23,6 +24,7 @@ PAGE_ROWS = 1_000
 ID_TYPE = "esriFieldTypeOID"
 
 
+@service
 def fetch_layer(client: Client, area: Area | None) -> Download:
     """Fetch a layer in WGS 84 as GeoJSON or, from an old server, as JSON of Esri.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from semsig_gis.core import SourceError
+from semsig_gis.sources.services.fetch import service
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field, known_coordinates
 from semsig_gis.sources.services.pages import (
     Page,
@@ -34,6 +35,7 @@ POINTS = frozenset({"location", "multipoint", "point"})
 SHAPES = frozenset({"line", "multiline", "multipolygon", "polygon"})
 
 
+@service
 def fetch_layer(client: Client, area: Area | None) -> Download:
     """Fetch a dataset by its identifier, such as ``uvpi-gqnh``, ordered by the ids of its rows.
 
