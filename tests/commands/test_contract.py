@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import json
 import os
+import shlex
 from typing import TYPE_CHECKING, Any
 
 import jsonschema
 import pytest
 from sentences import sentence
 
-from semsig_gis.commands import commands
+from semsig_gis.commands import Result, command_line, commands
 from semsig_gis.commands.schema import command_schema
 
 if TYPE_CHECKING:
@@ -212,14 +214,37 @@ def test_interrupt_and_full_disk_leave_no_new_file(
     assert files(city) == before
 
 
+@pytest.mark.usefixtures("unchanged")
 @pytest.mark.parametrize("name", COMMANDS)
 def test_interrupt_in_the_work_ends_the_command(
-    name: str, city: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+    name: str, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(COMMANDS[name].request, "run", interrupted)
-    before = files(city)
     assert run("", *line_of(name)) == (130, "", "semsig: interrupted\n")
-    assert files(city) == before
+
+
+@pytest.mark.usefixtures("unchanged")
+@pytest.mark.parametrize("name", COMMANDS)
+def test_request_fits_its_schema_and_is_given_again_by_its_command_line(
+    name: str, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    requests: list[Any] = []
+
+    def keep(request: object, _: object) -> Result:
+        requests.append(request)
+        return Result()
+
+    monkeypatch.setattr(COMMANDS[name].request, "run", keep)
+    assert run("", *line_of(name))[0] == 0
+    (request,) = requests
+    program, *words = shlex.split(command_line(request))
+    assert program == "semsig"
+    assert run("", *words)[0] == 0
+    assert requests == [request, request]
+    schema = command_schema(COMMANDS[name])["request"]
+    jsonschema.Draft202012Validator.check_schema(schema)
+    values = json.loads(json.dumps(dataclasses.asdict(request), default=str))
+    jsonschema.validate(values, schema)
