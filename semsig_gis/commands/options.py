@@ -69,9 +69,10 @@ MethodText = Annotated[
         title="Method",
         metavar="METHOD",
         default=DEFAULT_METHOD,
+        advanced=True,
     ),
 ]
-Paper = Annotated[bool, Option(f"Rank as the paper does: --method {PAPER_METHOD}.")]
+Paper = Annotated[bool, Option(f"Rank as the paper does: --method {PAPER_METHOD}.", advanced=True)]
 Top = Annotated[
     int, Option("Number of candidates.", title="Number of candidates", low=1, high=MOST_TOP)
 ]
@@ -141,6 +142,7 @@ Heading = Annotated[
         "360.",
         title="North is",
         metavar="known|unknown|DEGREES",
+        advanced=True,
     ),
 ]
 OnGrid = Annotated[
@@ -167,6 +169,7 @@ SurelyHere = Annotated[
         "Assume that views are from the area of the database. Otherwise the chance that they "
         "are from elsewhere is 50 % before their objects are compared.",
         title="Surely from this area",
+        advanced=True,
     ),
 ]
 Smooth = Annotated[
@@ -261,6 +264,7 @@ class QueryOptions:
             unit="°",
             low=0.001,
             high=360,
+            advanced=True,
         ),
     ] = None
     look: Annotated[
@@ -271,6 +275,7 @@ class QueryOptions:
             unit="°",
             low=-360,
             high=360,
+            advanced=True,
         ),
     ] = None
     sectors: Annotated[
@@ -349,6 +354,7 @@ class SearchOptions:
             "?<=10 (at most ten objects).",
             title="A cell must see",
             metavar="CONDITION",
+            advanced=True,
         ),
     ] = None
     noise: Annotated[
@@ -472,7 +478,8 @@ class SearchOptions:
 
     def _prior(self, database: SignatureDatabase) -> tuple[NDArray[Any] | None, dict[str, Any]]:
         """Return the log prior of each cell, or None without a prior, and its plain values."""
-        parts, knowledge = [], {}
+        parts: list[NDArray[Any]] = []
+        knowledge: dict[str, Any] = {}
         if self.near is not None:
             from semsig_gis.localization import KnownPosition, position_prior
 

@@ -269,7 +269,7 @@ def open_experiment_spec(path: str | Path) -> ExperimentSpec:
 def _noise(name: str, noise: object, where: str, folder: Path) -> Noise:
     """Return the noise model of a table or of a file, with the given name."""
     if isinstance(noise, str):
-        values = open_noise(folder / noise).to_dict()
+        values: Mapping[str, Any] = open_noise(folder / noise).to_dict()
     elif isinstance(noise, dict):
         values = noise
     else:

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from semsig_gis.core import InputError, binomial_tail
 from semsig_gis.storage import parse_json, read_whole, whole_file
@@ -27,6 +28,19 @@ if TYPE_CHECKING:
 STARTS = 4
 """Starting points of the thresholds that are tried, from strict to loose."""
 STEPS = 100  # thresholds that are tried at most
+
+
+class RuleRecord(TypedDict):
+    """A rule as plain values; the threshold is None if nothing is answered."""
+
+    threshold: float | None
+    radius: float
+    precision: float
+    confidence: float
+    queries: int
+    answered: int
+    wrong: int
+    coverage: float
 
 
 def _is_number(value: object) -> TypeGuard[float]:
@@ -86,6 +100,19 @@ class AnswerRule:
     def coverage(self) -> float:
         """Share of the queries of the calibration that were answered; NaN without any."""
         return self.answered / self.queries if self.queries else math.nan
+
+    def to_dict(self) -> RuleRecord:
+        """Return plain values for JSON, with the coverage of the calibration."""
+        return {
+            "threshold": self.threshold if math.isfinite(self.threshold) else None,
+            "radius": self.radius,
+            "precision": self.precision,
+            "confidence": self.confidence,
+            "queries": self.queries,
+            "answered": self.answered,
+            "wrong": self.wrong,
+            "coverage": self.coverage,
+        }
 
     def answers(self, mass: float) -> bool:
         """Whether to answer, by the chance that the place is near the best one."""
