@@ -37,7 +37,7 @@ LINES: dict[str, tuple[str, ...]] = {
     "merge": ("first=city.parquet", "second=city.parquet", "out=c.parquet"),
     "info": ("database=city.parquet",),
     "clean": ("database=city.parquet",),
-    "localize": ("database=city.parquet", "types=DX", "out=answer.gpkg", "map=m.html"),
+    "localize": ("database=city.parquet", "types=DX", "out=answer.gpkg", "map_=m.html"),
     "route": ("database=city.parquet", "views=route.jsonl"),
     "suggest": ("database=city.parquet", "types=DX"),
     "serve": ("database=city.parquet",),
@@ -57,6 +57,14 @@ LINES: dict[str, tuple[str, ...]] = {
 }
 # Fields that need other values as well, or are read after another file that cannot be used.
 OTHERS: dict[tuple[str, str], tuple[dict[str, str], str]] = {
+    **{
+        (name, "drift_report"): ({"map_age": "3"}, "nowhere.parquet")
+        for name in ("localize", "route", "suggest", "learn", "calibrate", "evaluate")
+    },
+    ("localize", "queries"): ({"types": "", "out": "", "map_": ""}, "nowhere.parquet"),
+    ("benchmark", "noise"): ({}, "flatlandia.toml"),
+    ("learn", "unlabelled"): ({"samples": ""}, "nowhere.parquet"),
+    ("learn", "noise"): ({"samples": "", "unlabelled": "route.jsonl"}, "nowhere.parquet"),
     ("build", "streets"): ({"viewpoints": "streets"}, "nowhere.parquet"),
     ("view", "detector"): ({}, "boxes.json cannot be read"),
 }
@@ -66,11 +74,11 @@ RUN = [name for name in COMMANDS if name not in NOT_RUN]
 
 
 def line_of(name: str, /, **changes: str) -> list[str]:
-    """Return the words of the use of a command, with other values of some fields."""
+    """Return the words of the use of a command, with other values of some fields or none ("")."""
     values = dict(item.split("=", 1) for item in LINES[name]) | changes
     words = [name]
     for field in COMMANDS[name].fields:
-        if field.name in values:
+        if values.get(field.name):
             words += ([] if field.option.positional else [field.flag]) + [values[field.name]]
     return words
 
