@@ -95,9 +95,14 @@ class Benchmark:
         Option("Data set: flatlandia or london-lights.", title="Data set", positional=True),
     ]
     folder: Annotated[
-        Path, Option("Folder with the files of the data set.", positional=True, reads=True)
+        Path,
+        Option(
+            "Folder with the files of the data set.", metavar="FOLDER", positional=True, reads=True
+        ),
     ]
-    out: Annotated[Path | None, Option("Results to write (.json).", writes=".json")] = None
+    out: Annotated[
+        Path | None, Option("Results to write (.json).", title="Results", writes=".json")
+    ] = None
     methods: Annotated[
         str,
         Option(
@@ -120,7 +125,7 @@ class Benchmark:
     ] = 60.0
     limit: Annotated[
         int | None,
-        Option("Use at most this many views a set.", low=1, high=MOST_QUERIES),
+        Option("Use at most this many views a set.", title="Most views", low=1, high=MOST_QUERIES),
     ] = None
 
     def run(self, reporter: Reporter) -> Result:

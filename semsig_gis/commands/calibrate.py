@@ -42,7 +42,12 @@ class Calibrate:
 
     database: Database
     samples: Annotated[Path, SAMPLES]
-    out: Annotated[Path, Option("Rule to write (.json), for --rule.", writes="")]
+    out: Annotated[
+        Path,
+        Option(
+            "Rule to write (.json), for --rule.", title="Rule for answers", writes=(".json", "")
+        ),
+    ]
     precision: Annotated[
         float,
         Option("Share of the answers that should be right.", low=0.01, high=0.9999),

@@ -13,6 +13,7 @@ from semsig_gis.core import Table
 RESULT = Option(
     "Folder of an experiment or of an evaluation.",
     title="Folder of results",
+    metavar="FOLDER",
     positional=True,
     reads=True,
 )

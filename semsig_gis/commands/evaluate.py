@@ -58,11 +58,20 @@ class Evaluate:
     ] = "medium"
     keep_order: Annotated[
         bool,
-        Option("Do not sort the objects again after the bearing noise.", advanced=True),
+        Option(
+            "Do not sort the objects again after the bearing noise.",
+            title="Keep the order of the objects",
+            advanced=True,
+        ),
     ] = False
     false_class: Annotated[
         Literal["uniform", "frequency"] | None,
-        Option("How the class of a false object is drawn.", default="uniform", advanced=True),
+        Option(
+            "How the class of a false object is drawn.",
+            title="Class of false objects",
+            default="uniform",
+            advanced=True,
+        ),
     ] = None
     method: MethodText = None
     paper: Paper = False
@@ -92,11 +101,21 @@ class Evaluate:
     ] = 1
     seed: Seed = 0
     out: Annotated[
-        Path | None, Option("Folder to write the results to.", metavar="FOLDER", writes="")
+        Path | None,
+        Option(
+            "Folder to write the results to.",
+            title="Folder for the results",
+            metavar="FOLDER",
+            writes="",
+        ),
     ] = None
     report: Annotated[
         Path | None,
-        Option("Write a page with curves, a map and the worst failures (.html).", writes=".html"),
+        Option(
+            "Write a page with curves, a map and the worst failures (.html).",
+            title="Report page",
+            writes=".html",
+        ),
     ] = None
 
     def run(self, reporter: Reporter) -> Result:

@@ -26,7 +26,15 @@ class Experiment:
     spec: Annotated[
         Path, Option("Experiment, a .toml file.", title="Experiment", positional=True, reads=True)
     ]
-    out: Annotated[Path, Option("Folder to write the results to.", metavar="FOLDER", writes="")]
+    out: Annotated[
+        Path,
+        Option(
+            "Folder to write the results to.",
+            title="Folder for the results",
+            metavar="FOLDER",
+            writes="",
+        ),
+    ]
     workers: Workers = 0
     scheduler: Scheduler = None
 

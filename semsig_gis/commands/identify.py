@@ -94,7 +94,12 @@ class Identify:
     ] = None
     out: Annotated[
         Path | None,
-        Option("Folder to write a report of the check to.", metavar="FOLDER", writes=""),
+        Option(
+            "Folder to write a report of the check to.",
+            title="Folder of the check",
+            metavar="FOLDER",
+            writes="",
+        ),
     ] = None
 
     def run(self, reporter: Reporter) -> Result:

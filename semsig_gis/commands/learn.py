@@ -76,7 +76,14 @@ class Learn:
             advanced=True,
         ),
     ] = "photo"
-    out: Annotated[Path, Option("Noise model to write (.toml or .json), for --noise.", writes="")]
+    out: Annotated[
+        Path,
+        Option(
+            "Noise model to write (.toml or .json), for --noise.",
+            title="Noise model",
+            writes=(".toml", ".json", ""),
+        ),
+    ]
     map_age: MapAge = 0.0
     drift_report: DriftReport = None
     heading: Heading = "known"

@@ -82,15 +82,17 @@ class Localize(SearchOptions, QueryOptions):
     paper: Paper = False
     top: Top = 10
     explain: Explain = False
-    map_: Annotated[Path | None, Option("Map to write (.html).", writes=".html")] = None
+    map_: Annotated[
+        Path | None, Option("Map to write (.html).", title="Map page", writes=".html")
+    ] = None
     out: Annotated[
         Path | None,
         Option(
             "File to write: search regions and candidates for QGIS (.gpkg) or in degrees "
             "(.geojson, .kml), only the regions (.parquet, .fgb, .csv), or the chance of every "
             "cell (.tif).",
-            title="Regions to search",
-            writes="",
+            title="Answer",
+            writes=(".gpkg", ""),
         ),
     ] = None
     share: Annotated[

@@ -36,6 +36,14 @@ MOST_TOP = 10_000
 # The same limits as in `core` and the specs, which are slow to import.
 MOST_SEED, MOST_METRES, MOST_WORKERS, MOST_QUERIES = 10**18, 1_000_000, 1024, 10_000_000
 
+
+def noises() -> tuple[str, ...]:
+    """Return the names of the noise models."""
+    from semsig_gis.localization import NOISES
+
+    return tuple(NOISES)
+
+
 Database = Annotated[
     Path,
     Option(
@@ -72,7 +80,14 @@ MethodText = Annotated[
         advanced=True,
     ),
 ]
-Paper = Annotated[bool, Option(f"Rank as the paper does: --method {PAPER_METHOD}.", advanced=True)]
+Paper = Annotated[
+    bool,
+    Option(
+        f"Rank as the paper does: --method {PAPER_METHOD}.",
+        title="Method of the paper",
+        advanced=True,
+    ),
+]
 Top = Annotated[
     int, Option("Number of candidates.", title="Number of candidates", low=1, high=MOST_TOP)
 ]
@@ -111,6 +126,7 @@ NoiseName = Annotated[
         title="Errors of the detector",
         metavar="NAME|FILE",
         reads=True,
+        suggestions=noises,
     ),
 ]
 MapAge = Annotated[
@@ -367,6 +383,7 @@ class SearchOptions:
             default="by-hand for a view in words, photo for a view of sectors, panorama for a "
             "full turn with scores, otherwise generic",
             reads=True,
+            suggestions=noises,
         ),
     ] = None
     map_age: MapAge = 0.0

@@ -56,11 +56,20 @@ class Reproduce:
         ),
     ] = None
     out: Annotated[
-        Path, Option("Folder to write the report and results to.", metavar="FOLDER", writes="")
+        Path,
+        Option(
+            "Folder to write the report and results to.",
+            title="Folder for the results",
+            metavar="FOLDER",
+            writes="",
+        ),
     ]
     size: Annotated[
         Literal["full", "small"],
-        Option("Run the paper's 10,000 queries, or 300 in a small city."),
+        Option(
+            "Run the paper's 10,000 queries, or 300 in a small city.",
+            title="Size of the experiments",
+        ),
     ] = "full"
     queries: Annotated[
         int | None,

@@ -37,6 +37,7 @@ class _Views:
             "standard input. Each after the first has the step from the previous view, dx,dy or "
             "distance,bearing (metres, degrees), and its sigma; or use --track.",
             title="Views",
+            metavar="FILE|-",
             positional=True,
             reads=True,
         ),
