@@ -10,7 +10,7 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rapidfuzz.distance import Levenshtein
@@ -23,7 +23,7 @@ from semsig_gis.localization import build_index, cell_noise, locate, named_noise
 from semsig_gis.sources import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from semsig_gis.core import Signature
     from semsig_gis.database import SignatureDatabase
@@ -45,14 +45,15 @@ _TIMED_COMMAND = """
 import sys, time
 from benchmarks.memory import own_peak
 from semsig_gis.cli import main
-from semsig_gis.cli import localize as command
+from semsig_gis.commands.localize import Localize
 seconds = 0.0
 def timed(*arguments):
     global seconds
     start = time.perf_counter()
-    answer(*arguments)
+    result = answer(*arguments)
     seconds = time.perf_counter() - start
-answer, command._answer = command._answer, timed
+    return result
+answer, Localize._answer = Localize._answer, timed
 try:
     main()
 finally:
@@ -141,7 +142,7 @@ def _cold_rows(
     repeats: int,
 ) -> Iterator[Comparison]:
     """Measure new processes of the command."""
-    view = query.to_dict(database.taxonomy)
+    view: Mapping[str, Any] = query.to_dict(database.taxonomy)
     options = "--types", view["types"], "--bearings", ",".join(map(str, view["bearings"]))
     cells = f"{len(database):,} cells"
     plain = *_localize(city), *options

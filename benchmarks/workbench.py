@@ -13,7 +13,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
 from benchmarks.street_photos import WIDTH, street_photo
-from semsig_gis.cli.options import object_store
+from semsig_gis.commands import SILENT, object_store
 from semsig_gis.evaluation import Sight
 from semsig_gis.serve import Workbench, make_server, open_listener, server_address
 
@@ -56,7 +56,7 @@ _TIMES = "return performance.getEntriesByName('semsig-answer').map((entry) => en
 @contextlib.contextmanager
 def serving(city: City) -> Iterator[str]:
     """Serve the workbench of a city while the block runs; yield its address."""
-    bench = Workbench(city=city, store=object_store(city, None, needed=False))
+    bench = Workbench(city=city, store=object_store(city, None, SILENT, needed=False))
     bench.prepare()
     token = secrets.token_urlsafe(32)
     with open_listener(0) as listener:

@@ -12,7 +12,6 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from semsig_gis import __version__
-from semsig_gis.cli import console
 from semsig_gis.cli.console import REPORTER, print_json, print_table, remark, say, talk
 from semsig_gis.commands import (
     GROUPS,
@@ -84,9 +83,9 @@ class _Commands(Mapping[str, Any]):
     """The commands as typer's, made when they are looked up."""
 
     def __init__(self) -> None:
-        import semsig_gis.cli.commands  # noqa: F401 - those that are not made from `commands`
+        import semsig_gis.cli.serve  # noqa: F401 - a command above `commands`
 
-        self.parsed = dict(typer.main.get_command(console.app).commands)  # type: ignore[attr-defined]
+        self.parsed: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - of typer
         if name not in self.parsed:
@@ -95,7 +94,7 @@ class _Commands(Mapping[str, Any]):
         return self.parsed[name]
 
     def __iter__(self) -> Iterator[str]:
-        names = [*commands(installed=False), *self.parsed, *installed_command_names()]
+        names = [*commands(installed=False), *installed_command_names()]
         return iter(dict.fromkeys(names))
 
     def __len__(self) -> int:

@@ -1,41 +1,27 @@
-"""The typer application, its output, and options and checks that several commands share."""
+"""Output of the command line: results, remarks and progress."""
 
 from __future__ import annotations
 
 import contextlib
 import functools
-import inspect
 import json
 import os
 import re
-import shlex
 import signal
 import sys
 import threading
 import time
 from contextvars import ContextVar
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
-from semsig_gis import __version__
-from semsig_gis.core import (
-    DEFAULT_METHOD,
-    PAPER_METHOD,
-    DatabaseError,
-    InputError,
-    visible,
-    visible_lines,
-)
-from semsig_gis.localization import METRICS
+from semsig_gis.core import visible, visible_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from semsig_gis.core import Table
-    from semsig_gis.database import City
-    from semsig_gis.evaluation import Identifiability
 
 
 VARIABLE = "SEMSIG_SUPERVISED"
@@ -226,187 +212,6 @@ def _progress_lines(label: str) -> Callable[[int, int], None]:
 
     advance(0, 1)
     return advance
-
-
-Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Print results only, without progress and remarks.")
-]
-Verbose = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Report each step and how long it took.")
-]
-
-
-class Commands(typer.Typer):
-    """A typer application that adds `--quiet` and `--verbose` to each command."""
-
-    def command(  # type: ignore[override]
-        self,
-        name: str | None = None,
-        *,
-        help: str | None = None,  # noqa: A002 - as typer's
-    ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-        """Return a decorator that registers a function as a command with these two options."""
-        register = super().command(name, help=help)
-
-        def wrap(function: Callable[..., None]) -> Callable[..., None]:
-            @functools.wraps(function)
-            def run(*, quiet: bool, verbose: bool, **values: Any) -> None:  # noqa: ANN401 - any options
-                if quiet and verbose:
-                    raise InputError("--quiet and --verbose were given; give one of them.")
-                before = talk.set("quiet" if quiet else "verbose" if verbose else "plain")
-                try:
-                    function(**values)
-                finally:
-                    talk.reset(before)
-
-            hints = get_type_hints(function, include_extras=True)
-            parameters = [
-                parameter.replace(
-                    annotation=hints.get(parameter.name, parameter.annotation),
-                    kind=inspect.Parameter.KEYWORD_ONLY,
-                )
-                for parameter in inspect.signature(function).parameters.values()
-            ]
-            parameters += [
-                inspect.Parameter(
-                    name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=option
-                )
-                for name, option in (("quiet", Quiet), ("verbose", Verbose))
-            ]
-            run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-            register(run)
-            return function
-
-        return wrap
-
-
-app = Commands(
-    name="semsig",
-    help="Find where in a city a view was taken, from the street objects in it.",
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
-
-
-def _version(value: bool) -> None:  # noqa: FBT001 - typer calls it so
-    if value:
-        say(f"semsig {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _common(
-    *,
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Find where in a city a view was taken, from the street objects in it."""
-
-
-Database = Annotated[Path, typer.Argument(help="Signature database written by `semsig build`.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
-
-MethodText = Annotated[
-    str | None,
-    typer.Option(
-        "--method",
-        help=f"Rank by likelihood, or by distance as TYPES+ANGLES ({', '.join(METRICS)}), "
-        "types:edit or angles:edit; add :5% for two stages, :alpha=0.7, :raw or "
-        f":weights=INSERT/DELETE/SUBSTITUTE.  [default: {DEFAULT_METHOD}]",
-        show_default=False,
-    ),
-]
-Paper = Annotated[
-    bool, typer.Option("--paper", help=f"Rank as the paper does: --method {PAPER_METHOD}.")
-]
-
-# The same limits as in `core` and the specs, which are slow to import.
-MOST_SEED, MOST_METRES, MOST_WORKERS, MOST_QUERIES = 10**18, 1_000_000, 1024, 10_000_000
-
-Workers = Annotated[
-    int, typer.Option(min=0, max=MOST_WORKERS, help="Number of processes on this machine.")
-]
-Scheduler = Annotated[str | None, typer.Option(help="Dask scheduler, as tcp://HOST:PORT.")]
-
-
-def chosen_method(method: str | None, *, paper: bool) -> str:
-    """Return the name of the method from --method and --paper."""
-    if method is not None and paper:
-        raise InputError(f"--paper was given with --method {method}; give one of them.")
-    return PAPER_METHOD if paper else method or DEFAULT_METHOD
-
-
-def command_line() -> str:
-    """Return this command as a line for a shell."""
-    return shlex.join(["semsig", *sys.argv[1:]])
-
-
-def city_name(database: Path) -> str:
-    """Return the name of a city for headings, from the name of its file."""
-    return database.stem.replace("_", " ").capitalize()
-
-
-def keep_inputs(*written: Path | None, read: Iterable[str | Path | None]) -> None:
-    """Raise InputError if an input file would be overwritten, or a file written twice."""
-    used = {os.path.realpath(path) for path in read if path is not None}
-    for path in written:
-        if path is None:
-            continue
-        if os.path.realpath(path) in used:
-            raise InputError(
-                f"{path} would be written, but this command uses it for something else as "
-                "well; give another name."
-            )
-        used.add(os.path.realpath(path))
-
-
-def require_suffix(suffix: str, *written: Path | None) -> None:
-    """Raise InputError if the name of a file to write has another suffix."""
-    for path in written:
-        if path is not None and path.suffix.lower() != suffix and not path.is_dir():
-            raise InputError(f"{path} cannot be written; the name must end in {suffix}.")
-
-
-def numbers(text: str, option: str) -> list[float]:
-    """Return the numbers of an option that are separated by commas."""
-    try:
-        return [float(part) for part in text.split(",")] if text.strip() else []
-    except ValueError as error:
-        raise InputError(
-            f"{option} was given as {text!r}; give numbers with commas between them."
-        ) from error
-
-
-def known_identifiability(city: City) -> Identifiability | None:
-    """Return the columns of `semsig identify`; None if missing, with a remark if outdated."""
-    try:
-        if not city.has_columns:
-            return None
-        from semsig_gis.evaluation import open_identifiability
-
-        return open_identifiability(city.database, city.path)
-    except DatabaseError as error:
-        remark(str(error))
-        return None
-
-
-def warn_if_online(offline: bool, *, tiles: str | None = None) -> None:  # noqa: FBT001
-    """Print a remark if a map needs a network."""
-    if not offline:
-        what = "Leaflet" if tiles is None else "its tiles"
-        remark(f"the map takes {what} from the web, so it needs a network to be displayed")
-
-
-def print_tables(tables: Iterable[Table | str]) -> None:
-    """Print tables with their notes, and sentences between them."""
-    for table in tables:
-        if isinstance(table, str):
-            say(table)
-            continue
-        print_rows(table.title, table.columns, table.rows)
-        if table.note:
-            say(table.note)
 
 
 def print_table(table: Table) -> None:

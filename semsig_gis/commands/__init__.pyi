@@ -12,4 +12,8 @@ from .model import command_line as command_line
 from .model import commands as commands
 from .model import fields_of as fields_of
 from .model import run_command as run_command
-from .options import draw_ground as draw_ground
+from .options import Database as Database
+from .options import NoiseName as NoiseName
+from .options import Objects as Objects
+from .options import object_store as object_store
+from .options import read_noise as read_noise

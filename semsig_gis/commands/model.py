@@ -306,8 +306,8 @@ def command(
 
     The class has fields that are annotated with an `Option`, and a method ``run(reporter)`` that
     returns a `Result`. Its docstring is the help. `order` sorts the commands of a group, and
-    `returns` is the type of the values of the result, usually a TypedDict, or a function that
-    returns it where its module is slow to import; None: it has none.
+    `returns` is the type of the values of the result, usually a TypedDict, or its
+    ``"module:name"`` if the module is slow to import; None: it has none.
     """
     if group not in GROUPS:
         raise InputError(f"{group!r} is no group of commands; give one of {', '.join(GROUPS)}.")
@@ -368,20 +368,23 @@ def run_command(request: Any, reporter: Reporter = SILENT) -> Result:  # noqa: A
         if field.option.reads
         for path in _paths(values[field.name])
     }
-    for field in fields:
-        path = values[field.name]
-        if not field.suffixes or path is None:
-            continue
+    written = [
+        (values[field.name], field.suffixes)
+        for field in fields
+        if field.suffixes and values[field.name] is not None
+    ]
+    for path, _ in written:
         if os.path.realpath(path) in used:
             raise InputError(
                 f"{path} would be written, but this command uses it for something else as "
                 "well; give another name."
             )
         used.add(os.path.realpath(path))
-        fits = path.suffix.lower() in field.suffixes or "" in field.suffixes
+    for path, suffixes in written:
+        fits = path.suffix.lower() in suffixes or "" in suffixes
         if not fits and not path.is_dir():
             raise InputError(
-                f"{path} cannot be written; the name must end in {' or '.join(field.suffixes)}."
+                f"{path} cannot be written; the name must end in {' or '.join(suffixes)}."
             )
     result: Result = request.run(reporter)
     return result

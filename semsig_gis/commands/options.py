@@ -36,6 +36,14 @@ MOST_TOP = 10_000
 # The same limits as in `core` and the specs, which are slow to import.
 MOST_SEED, MOST_METRES, MOST_WORKERS, MOST_QUERIES = 10**18, 1_000_000, 1024, 10_000_000
 
+
+def noises() -> tuple[str, ...]:
+    """Return the names of the noise models."""
+    from semsig_gis.localization import NOISES
+
+    return tuple(NOISES)
+
+
 Database = Annotated[
     Path,
     Option(
@@ -69,9 +77,17 @@ MethodText = Annotated[
         title="Method",
         metavar="METHOD",
         default=DEFAULT_METHOD,
+        advanced=True,
     ),
 ]
-Paper = Annotated[bool, Option(f"Rank as the paper does: --method {PAPER_METHOD}.")]
+Paper = Annotated[
+    bool,
+    Option(
+        f"Rank as the paper does: --method {PAPER_METHOD}.",
+        title="Method of the paper",
+        advanced=True,
+    ),
+]
 Top = Annotated[
     int, Option("Number of candidates.", title="Number of candidates", low=1, high=MOST_TOP)
 ]
@@ -110,6 +126,7 @@ NoiseName = Annotated[
         title="Errors of the detector",
         metavar="NAME|FILE",
         reads=True,
+        suggestions=noises,
     ),
 ]
 MapAge = Annotated[
@@ -141,6 +158,7 @@ Heading = Annotated[
         "360.",
         title="North is",
         metavar="known|unknown|DEGREES",
+        advanced=True,
     ),
 ]
 OnGrid = Annotated[
@@ -167,6 +185,7 @@ SurelyHere = Annotated[
         "Assume that views are from the area of the database. Otherwise the chance that they "
         "are from elsewhere is 50 % before their objects are compared.",
         title="Surely from this area",
+        advanced=True,
     ),
 ]
 Smooth = Annotated[
@@ -261,6 +280,7 @@ class QueryOptions:
             unit="°",
             low=0.001,
             high=360,
+            advanced=True,
         ),
     ] = None
     look: Annotated[
@@ -271,6 +291,7 @@ class QueryOptions:
             unit="°",
             low=-360,
             high=360,
+            advanced=True,
         ),
     ] = None
     sectors: Annotated[
@@ -349,6 +370,7 @@ class SearchOptions:
             "?<=10 (at most ten objects).",
             title="A cell must see",
             metavar="CONDITION",
+            advanced=True,
         ),
     ] = None
     noise: Annotated[
@@ -361,6 +383,7 @@ class SearchOptions:
             default="by-hand for a view in words, photo for a view of sectors, panorama for a "
             "full turn with scores, otherwise generic",
             reads=True,
+            suggestions=noises,
         ),
     ] = None
     map_age: MapAge = 0.0
@@ -472,7 +495,8 @@ class SearchOptions:
 
     def _prior(self, database: SignatureDatabase) -> tuple[NDArray[Any] | None, dict[str, Any]]:
         """Return the log prior of each cell, or None without a prior, and its plain values."""
-        parts, knowledge = [], {}
+        parts: list[NDArray[Any]] = []
+        knowledge: dict[str, Any] = {}
         if self.near is not None:
             from semsig_gis.localization import KnownPosition, position_prior
 

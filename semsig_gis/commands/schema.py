@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import inspect
+import pkgutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -97,7 +97,9 @@ def result_schema(item: Command) -> dict[str, Any] | None:
         def dataclass_schema(self, schema: Any) -> dict[str, Any]:  # noqa: ANN401 - of pydantic
             return {"additionalProperties": False, **super().dataclass_schema(schema)}
 
-    returns = item.returns() if inspect.isfunction(item.returns) else item.returns
+    returns = item.returns
+    if isinstance(returns, str):
+        returns = pkgutil.resolve_name(returns)
     schema = TypeAdapter(returns).json_schema(mode="serialization", schema_generator=Closed)
     # References are within the schema of the result, also in the schema of all commands.
     return {"$id": f"urn:semsig:{item.name}", **schema}

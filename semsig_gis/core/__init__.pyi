@@ -96,6 +96,7 @@ from .rtree import PackedIndex as PackedIndex
 from .signature import BEARING_UNITS as BEARING_UNITS
 from .signature import DISTANCE_UNITS as DISTANCE_UNITS
 from .signature import Signature as Signature
+from .signature import SignatureRecord as SignatureRecord
 from .signature import SignatureSpec as SignatureSpec
 from .signature import distance_units_of as distance_units_of
 from .signature import quantize as quantize

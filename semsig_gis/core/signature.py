@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
@@ -26,6 +27,14 @@ MAX_LEVELS = 255
 BEARING_UNITS = 7200
 # Stored steps of the largest visibility range; a unit is 12 cm if that is 30 m.
 DISTANCE_UNITS = 255
+
+
+class SignatureRecord(TypedDict):
+    """A signature as plain values: symbols, degrees and the number of objects."""
+
+    types: str | None
+    bearings: list[float] | None
+    length: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +172,7 @@ class Signature(Displayed):
         part = self.codes if self.codes is not None else self.bearings
         return 0 if part is None else len(part)
 
-    def to_dict(self, taxonomy: Taxonomy) -> dict[str, Any]:
+    def to_dict(self, taxonomy: Taxonomy) -> SignatureRecord:
         """Return ``types`` (symbols), ``bearings`` (degrees) and ``length`` for JSON.
 
         Unknown types or bearings are None.

@@ -1,5 +1,6 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
+from .compare import ComparisonRecord as ComparisonRecord
 from .compare import changed_successes as changed_successes
 from .compare import common_cases as common_cases
 from .compare import compare_evaluations as compare_evaluations
@@ -18,6 +19,7 @@ from .experiments.tables import experiment_markdown as experiment_markdown
 from .experiments.tables import experiment_tables as experiment_tables
 from .figures import AMBIGUITIES as AMBIGUITIES
 from .figures import LENGTHS as LENGTHS
+from .figures import CalibrationRecord as CalibrationRecord
 from .figures import calibration_bins as calibration_bins
 from .figures import coverage_curve as coverage_curve
 from .figures import district_labels as district_labels
@@ -41,6 +43,7 @@ from .identifiability.lookalikes import find_lookalikes as find_lookalikes
 from .identifiability.result import BANDS as BANDS
 from .identifiability.result import ClassGain as ClassGain
 from .identifiability.result import Identifiability as Identifiability
+from .identifiability.result import IdentifiabilityRecord as IdentifiabilityRecord
 from .identifiability.result import identifiability_of as identifiability_of
 from .identifiability.result import open_identifiability as open_identifiability
 from .identifiability.result import save_identifiability as save_identifiability
@@ -73,6 +76,7 @@ from .photographs import DETECTIONS as DETECTIONS
 from .photographs import PHOTOGRAPHS as PHOTOGRAPHS
 from .photographs import Photograph as Photograph
 from .photographs import PhotographData as PhotographData
+from .photographs import PhotographRecord as PhotographRecord
 from .photographs import build_photographed_city as build_photographed_city
 from .photographs import photograph_calibration as photograph_calibration
 from .photographs import photograph_failures as photograph_failures
@@ -105,6 +109,8 @@ from .queries.draw import draw_queries as draw_queries
 from .queries.true_view import CitySights as CitySights
 from .queries.true_view import Sight as Sight
 from .result import Evaluation as Evaluation
+from .result import EvaluationRecord as EvaluationRecord
+from .result import ExperimentRecord as ExperimentRecord
 from .result import PlotKind as PlotKind
 from .result import machine as machine
 from .scoring import evaluate as evaluate

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from typing_extensions import TypedDict
 
 from semsig_gis.core import InputError
 from semsig_gis.evaluation.figures import percentiles
@@ -22,6 +23,21 @@ BATCH = 50  # samples computed together
 PERCENTILES = {"error_median": ("error_m", 50), "error_p90": ("error_m", 90)}
 HEADINGS = {"heading_error_median": ("heading_error", 50)}
 INTERVAL = (2.5, 97.5)
+
+
+class DifferenceRecord(TypedDict):
+    """A row of `compare_evaluations` as plain values."""
+
+    figure: str
+    first: float | None
+    second: float | None
+    difference: float | None
+    low: float | None
+    high: float | None
+
+
+ComparisonRecord = dict[str, list[DifferenceRecord]]
+"""The differences by case."""
 
 
 def compare_evaluations(

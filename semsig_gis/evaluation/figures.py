@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from typing_extensions import TypedDict
 
 from semsig_gis.core import ERROR_BREAKS, InputError, quantile_ranks, wilson_interval
 from semsig_gis.localization import DEFAULT_RULE, NEAR_PLACES, expected_recall
@@ -26,6 +27,42 @@ AMBIGUITIES = ("1", "2-9", "10-99", "100-999", "1000+")  # cells with the types 
 ELSEWHERE = "elsewhere"
 ANSWER_THRESHOLDS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)
 CALIBRATION_BINS = 10
+
+
+class MeanRecord(TypedDict):
+    """A row of `figure_means` as plain values."""
+
+    figure: str
+    value: float | None
+    low: float | None
+    high: float | None
+    n: int
+
+
+class CoverageRecord(TypedDict):
+    """A row of `coverage_curve` as plain values."""
+
+    threshold: float
+    answered: int
+    coverage: float
+    precision: float | None
+    low: float | None
+    high: float | None
+
+
+CalibrationRecord = TypedDict(
+    "CalibrationRecord",
+    {
+        "from": float,
+        "to": float,
+        "n": int,
+        "stated": float | None,
+        "true": float | None,
+        "low": float | None,
+        "high": float | None,
+    },
+)
+"""A row of `calibration_bins` as plain values."""
 
 
 def query_figures(queries: pd.DataFrame, *, cells: int) -> pd.DataFrame:
@@ -183,7 +220,7 @@ def calibration_bins(queries: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def plain_records(table: pd.DataFrame) -> list[dict[str, Any]]:
+def plain_records(table: pd.DataFrame) -> list[Any]:
     """Return the rows of a table as values for JSON, with None for infinite numbers and NaN."""
     return [
         {

@@ -77,7 +77,7 @@ def save_evaluation(evaluation: Evaluation, folder: str | Path) -> None:
     }
     geo = geo_metadata(points.crs, geometry_types=["Point"], bounds=points.total_bounds)
     write_geoparquet(table, Path(folder) / QUERIES, geo=geo, specs=specs)
-    summary = evaluation.summary()
+    summary: dict[str, Any] = {**evaluation.summary()}
     timing = summary.pop("timing")
     for name, content in ((SUMMARY, summary), (TIMING, timing)):
         text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)

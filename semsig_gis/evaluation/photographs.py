@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NotRequired
 
 import numpy as np
 import pandas as pd
+from typing_extensions import TypedDict
 
 from semsig_gis.core import GridSpec, InputError, SignatureSpec, angular_distance, to_degrees
 from semsig_gis.database import ObjectStore, build_database, open_city, save_with_store
-from semsig_gis.evaluation.figures import calibration_bins, range_labels
+from semsig_gis.evaluation.figures import CalibrationRecord, calibration_bins, range_labels
 from semsig_gis.localization import DEFAULT_RULE, LikelihoodLocator, Location, UsualLocator, explain
 from semsig_gis.objects import assemble, choose_layers, read_files
 from semsig_gis.observation import RADIUS_M, parse_view
@@ -36,6 +37,52 @@ SCENE = ("verdict", "query_class", "query_bearing", "object_class", "object_bear
 WITHIN_M = (5, 10, 25, 50)
 FAILURES = 6
 TURN = 137.5  # degrees; each view without a compass is turned by another multiple of it
+
+
+class MethodRecord(TypedDict):
+    """A row of `photograph_table` as plain values."""
+
+    method: str
+    set: str
+    detections: str
+    n: int
+    p5: float
+    p10: float
+    p25: float
+    p50: float
+    heading_error: float | None
+    answered: float | None
+    right: float | None
+    brier: float | None
+    calibration_error: float | None
+    seconds: float
+
+
+class BinRecord(CalibrationRecord):
+    """A row of `photograph_calibration` as plain values."""
+
+    method: str
+    set: str
+
+
+class FailuresRecord(TypedDict):
+    """The worst failures of a method (see `photograph_failures`)."""
+
+    method: str
+    views: list[dict[str, Any]]
+
+
+class PhotographRecord(TypedDict):
+    """The result of methods on a data set of photographs, as plain values."""
+
+    data: str
+    radius: float
+    cells: int
+    limit: int | None
+    classes: list[dict[str, Any]]
+    table: list[MethodRecord]
+    calibration: list[BinRecord]
+    failures: NotRequired[FailuresRecord]
 
 
 @dataclass(frozen=True, kw_only=True)

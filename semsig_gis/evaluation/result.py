@@ -7,9 +7,10 @@ import math
 import os
 import platform
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NotRequired
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from semsig_gis.core import Displayed, InputError, map_with, percent, plot_with
 from semsig_gis.database import rows_of_result
@@ -18,6 +19,9 @@ from semsig_gis.evaluation.figures import (
     ELSEWHERE,
     LENGTHS,
     RECALLS,
+    CalibrationRecord,
+    CoverageRecord,
+    MeanRecord,
     calibration_bins,
     coverage_curve,
     district_labels,
@@ -68,6 +72,66 @@ def machine() -> dict[str, Any]:
         "processors": os.cpu_count() or 1,
         "memory_gb": None if memory is None else round(memory, 1),
     }
+
+
+class SettingsRecord(TypedDict):
+    """The settings of an evaluation as plain values."""
+
+    method: str
+    distortions: list[str]
+    seen_from: str
+    city: str | None
+    top: int
+    seeds: list[int]
+    queries: int
+
+
+class SharesRecord(TypedDict):
+    """The shares of `Evaluation.answers`."""
+
+    coverage: NotRequired[float | None]
+    precision: NotRequired[float | None]
+    in_region: NotRequired[float | None]
+
+
+class FiguresRecord(SharesRecord):
+    """The figures of an evaluation as plain values; groups have a column for each figure."""
+
+    p_error_within_m: dict[str, float]
+    recall_at_percent: dict[str, float]
+    recall_of_best_within_25_m: dict[str, float]
+    median_error_m: float | None
+    p90_error_m: float | None
+    median_heading_error: float | None
+    successful: float
+    unlocalized: int
+    intervals: list[MeanRecord]
+    by_length: list[dict[str, str | float | None]]
+    by_ambiguity: list[dict[str, str | float | None]]
+    coverage_curve: list[CoverageRecord]
+    calibration: list[CalibrationRecord]
+
+
+class TimingRecord(TypedDict):
+    """The time of a query, and the properties of the machine."""
+
+    seconds_per_query: float | None
+    machine: dict[str, Any]
+
+
+class EvaluationRecord(TypedDict):
+    """An evaluation as plain values; `foreign` is the result for views of another city."""
+
+    settings: SettingsRecord
+    database: dict[str, Any]
+    results: FiguresRecord
+    versions: dict[str, str]
+    timing: TimingRecord
+    foreign: NotRequired[list[dict[str, Any]]]
+
+
+ExperimentRecord = dict[str, EvaluationRecord]
+"""The evaluations of an experiment by case."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -302,7 +366,7 @@ class Evaluation(Displayed):
         """Return stated probabilities and right answers (`evaluation.figures.calibration_bins`)."""
         return calibration_bins(self.queries)
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> EvaluationRecord:
         """Return ``settings``, ``database``, ``results``, ``versions`` and ``timing`` for JSON.
 
         All but ``timing`` are the same if the evaluation is repeated. Infinity and NaN are None.
@@ -310,6 +374,8 @@ class Evaluation(Displayed):
         errors = self.queries["error_m"].to_numpy(dtype=np.float64)
         turns = self.queries["heading_error"].to_numpy(dtype=np.float64)
         by_chance = self.method.noise is not None
+        answers: Any = {name: finite_or_none(value) for name, value in self.answers().items()}
+        shares: SharesRecord = answers
         return {
             "settings": {
                 "method": str(self.method),
@@ -334,7 +400,7 @@ class Evaluation(Displayed):
                 "median_heading_error": finite_or_none(percentile(turns, 50)[0]),
                 "successful": float(self.successful.mean()),
                 "unlocalized": self.unlocalized,
-                **{name: finite_or_none(value) for name, value in self.answers().items()},
+                **shares,
                 "intervals": plain_records(self.means().reset_index()),
                 "by_length": plain_records(self.by_length()),
                 "by_ambiguity": plain_records(self.by_ambiguity()),

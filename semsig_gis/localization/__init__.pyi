@@ -2,6 +2,7 @@
 
 from .answers import REGION_SHARE as REGION_SHARE
 from .answers import Answer as Answer
+from .answers import AnswerRecord as AnswerRecord
 from .answers import Ranking as Ranking
 from .distance.memo import DistanceMemo as DistanceMemo
 from .distance.method import Method as Method
@@ -14,6 +15,7 @@ from .distance.metrics.edit import EditWeights as EditWeights
 from .distance.scores import score_cells as score_cells
 from .distance.search import DistanceLocator as DistanceLocator
 from .distance.search import Localization as Localization
+from .distance.search import LocalizationRecord as LocalizationRecord
 from .distance.ties import NEAR_METRES as NEAR_METRES
 from .distance.ties import NEAR_PLACES as NEAR_PLACES
 from .distance.ties import THRESHOLDS as THRESHOLDS
@@ -32,6 +34,7 @@ from .learning.fit import gather_evidence as gather_evidence
 from .learning.fit import model_change as model_change
 from .learning.fit import next_model as next_model
 from .learning.fit import shrunk_rates as shrunk_rates
+from .learning.learn import LearnRecord as LearnRecord
 from .learning.learn import NoiseEstimate as NoiseEstimate
 from .learning.learn import Sample as Sample
 from .learning.learn import extrapolated as extrapolated
@@ -46,6 +49,7 @@ from .learning.map_age import named_drift as named_drift
 from .learning.map_age import open_drift as open_drift
 from .likelihood.answer_rule import DEFAULT_RULE as DEFAULT_RULE
 from .likelihood.answer_rule import AnswerRule as AnswerRule
+from .likelihood.answer_rule import RuleRecord as RuleRecord
 from .likelihood.answer_rule import calibrate as calibrate
 from .likelihood.answer_rule import open_rule as open_rule
 from .likelihood.answer_rule import save_rule as save_rule
@@ -80,6 +84,10 @@ from .likelihood.locate import Location as Location
 from .likelihood.locate import locate as locate
 from .likelihood.locate import locate_in_areas as locate_in_areas
 from .likelihood.locate import locate_route as locate_route
+from .likelihood.location_record import LocationRecord as LocationRecord
+from .likelihood.location_record import PlaceRecord as PlaceRecord
+from .likelihood.location_record import PriorRecord as PriorRecord
+from .likelihood.location_record import RegionRecord as RegionRecord
 from .likelihood.method import LikelihoodMethod as LikelihoodMethod
 from .likelihood.off_centre import visible_objects_off_centre as visible_objects_off_centre
 from .likelihood.photo import LOST_SHARE as LOST_SHARE
@@ -111,9 +119,11 @@ from .locator import parse_method as parse_method
 from .locator import usual_noise as usual_noise
 from .noise.levels import Level as Level
 from .noise.levels import level_mixture as level_mixture
+from .noise.model import MixtureRecord as MixtureRecord
 from .noise.model import Noise as Noise
 from .noise.model import NoiseMixture as NoiseMixture
 from .noise.model import NoiseSpec as NoiseSpec
+from .noise.model import SpecRecord as SpecRecord
 from .noise.model import cell_noise as cell_noise
 from .noise.model import noise_from_dict as noise_from_dict
 from .noise.model import open_noise as open_noise
@@ -127,9 +137,11 @@ from .noise.table import database_tables as database_tables
 from .noise.table import mean_table as mean_table
 from .noise.table import noise_tables as noise_tables
 from .noise.table import query_bearings as query_bearings
+from .regions import RegionsRecord as RegionsRecord
 from .regions import SearchRegions as SearchRegions
 from .regions import search_regions as search_regions
 from .requirement import Requirement as Requirement
 from .suggest import ClassQuestion as ClassQuestion
+from .suggest import QuestionRecord as QuestionRecord
 from .suggest import next_questions as next_questions
 from .suggest import with_unplaced as with_unplaced

@@ -10,9 +10,18 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from typing_extensions import TypedDict
 
-from semsig_gis.core import LICENSES, Displayed, InputError, percent, plot_with, to_degrees
-from semsig_gis.observation import GRID_NORTH, View
+from semsig_gis.core import (
+    LICENSES,
+    Displayed,
+    InputError,
+    SignatureRecord,
+    percent,
+    plot_with,
+    to_degrees,
+)
+from semsig_gis.observation import GRID_NORTH, NorthRecord, View, ViewRecord
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,6 +42,41 @@ LEAST_ELSEWHERE = 0.1
 """Least chance of being from elsewhere that an answer states."""
 LEAST_FIT = 0.01
 """Goodness of fit below which a view fits badly."""
+
+
+class CandidateRecord(TypedDict):
+    """A candidate as plain values: the cell with its viewpoint, in metres and in degrees."""
+
+    cell: int
+    cell_id: int
+    x: float
+    y: float
+    lon: float
+    lat: float
+    types: str
+    length: int
+
+
+class PositionRecord(TypedDict):
+    """A known position as plain values, with the form in which it was read."""
+
+    x: float
+    y: float
+    lat: float
+    lon: float
+    sigma: float
+    read_as: str
+
+
+class AnswerRecord(TypedDict):
+    """The values that the answers of all methods have."""
+
+    query: ViewRecord | SignatureRecord
+    north: NorthRecord
+    cells: int
+    notes: list[str]
+    crs: str
+    licenses: list[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -82,7 +126,7 @@ class Answer(Displayed):
         """
 
     @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> AnswerRecord:
         """Return the answer as plain values for JSON."""
 
     def to_geodataframe(self) -> gpd.GeoDataFrame:
@@ -98,7 +142,7 @@ class Answer(Displayed):
         """Draw the possible places of the query (see `plot_answer`)."""
         return plot_with("plot_answer", self, ax=ax, legend=legend)
 
-    def _candidate_records(self) -> list[dict[str, Any]]:
+    def _candidate_records(self) -> list[Any]:
         """Return the candidates as plain values, with ``lon`` and ``lat`` rounded to 1 cm."""
         lon, lat = np.round(to_degrees(self.crs).transform(self.columns["x"], self.columns["y"]), 7)
         columns = {**self.columns, "lon": lon, "lat": lat}

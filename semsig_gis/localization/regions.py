@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NotRequired
 
 import geopandas as gpd
 import numpy as np
 import shapely
+from typing_extensions import TypedDict
 
 from semsig_gis.core import Displayed, InputError, percent
 from semsig_gis.localization.answers import REGION_SHARE
@@ -21,6 +22,16 @@ if TYPE_CHECKING:
     from semsig_gis.localization.answers import Answer
 
 CHANCES = ["chance", "searched_chance"]  # columns of the likelihood method only
+
+
+class RegionsRecord(TypedDict):
+    """The totals of all regions; the chance is that of the likelihood method."""
+
+    regions: int
+    cells: int
+    km2: float
+    percent: float
+    chance: NotRequired[float]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,10 +64,10 @@ class SearchRegions(Displayed):
         area = f"{total['km2']:.3f} km² ({total['percent']:.2g} %)"
         return {"regions": total["regions"], "cells": total["cells"], "area": area, **chance}
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> RegionsRecord:
         """Return the totals of all regions; ``percent`` is of the area of all cells."""
         last = self.table.iloc[-1]
-        summary = {
+        summary: RegionsRecord = {
             "regions": len(self.table),
             "cells": int(self.table["cells"].sum()),
             "km2": float(last["searched_km2"]),

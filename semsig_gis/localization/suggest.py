@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from semsig_gis.localization.likelihood.priors import weight_prior
 
@@ -23,6 +24,19 @@ if TYPE_CHECKING:
 
 LOOKED_FOR = 0.95
 """Minimum probability that a person who looks for an object detects it."""
+
+QuestionRecord = TypedDict(
+    "QuestionRecord",
+    {
+        "class": str,
+        "title": str,
+        "symbol": str,
+        "chance": float,
+        "gain": float,
+        "question": str,
+    },
+)
+"""A question as plain values; the gain is in bits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +79,7 @@ class ClassQuestion:
         article = "another" if self.more else "an" if title[0] in "aeiou" else "a"
         return f"Is there {article} {title} within {self.metres:g} m?"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> QuestionRecord:
         """Return plain values for JSON."""
         return {
             "class": self.item.name,

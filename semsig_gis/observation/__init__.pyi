@@ -32,6 +32,7 @@ from .files import read_route as read_route
 from .leg import Leg as Leg
 from .north import GRID_NORTH as GRID_NORTH
 from .north import North as North
+from .north import NorthRecord as NorthRecord
 from .north import declination as declination
 from .sentences import GUESS_ERROR as GUESS_ERROR
 from .sentences import RADIUS_M as RADIUS_M
@@ -48,4 +49,5 @@ from .view import LEAST_TURN as LEAST_TURN
 from .view import Photo as Photo
 from .view import Sector as Sector
 from .view import View as View
+from .view import ViewRecord as ViewRecord
 from .view import check_north as check_north

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from semsig_gis.core import (
     InputError,
@@ -30,6 +31,15 @@ NORTHS: tuple[NorthName, ...] = get_args(NorthName)
 MODELLED = dt.date(1900, 1, 1), dt.date(2029, 12, 31)
 """First and last day of the magnetic field model (IGRF-14)."""
 WIDE = 0.5  # degrees; an answer has a note if north varies by more within the city
+
+
+class NorthRecord(TypedDict):
+    """A north as plain values, in degrees; the date is that of magnetic north."""
+
+    name: NorthName
+    turn: float
+    spread: float
+    date: str | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +142,7 @@ class North:
         """Convert a bearing from grid north to a bearing from this north, in [0, 360)."""
         return (bearing - self.turn) % 360.0 if self.turn else bearing
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> NorthRecord:
         """Return plain values for JSON."""
         date = None if self.date is None else self.date.isoformat()
         return {"name": self.name, "turn": self.turn, "spread": self.spread, "date": date}

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, NotRequired
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from semsig_gis.core import (
     FULL_TURN,
@@ -19,6 +20,7 @@ from semsig_gis.core import (
     WILDCARD,
     InputError,
     Signature,
+    SignatureRecord,
     require_number,
     wrap_degrees,
 )
@@ -38,6 +40,23 @@ CLASSES = MAX_CODE + 1
 
 Sector = tuple[float, float]
 """From one bearing clockwise to another, in degrees; the second may be 360 or more."""
+
+
+class PhotoRecord(TypedDict):
+    """What a photo covers, as plain values in degrees."""
+
+    sectors: NotRequired[list[list[float]]]
+    heading_error: NotRequired[float | Literal["unknown"]]
+
+
+class ViewRecord(SignatureRecord, PhotoRecord):
+    """A view as plain values; the keys of its only photo are on the same level."""
+
+    ranges: NotRequired[list[float | None]]
+    range_errors: NotRequired[list[float | None]]
+    scores: NotRequired[list[dict[str, float]]]
+    photos: NotRequired[list[PhotoRecord]]
+    photo: NotRequired[list[int]]
 
 
 def check_north(north_sigma: float) -> None:
@@ -146,9 +165,9 @@ class Photo:
         start = [(float(wrap_degrees(low + degrees)), high - low) for low, high in self.sectors]
         return replace(self, sectors=tuple((low, low + width) for low, width in start))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PhotoRecord:
         """Return plain values for JSON: ``sectors`` and ``heading_error``, where there are any."""
-        values: dict[str, Any] = {}
+        values: PhotoRecord = {}
         if self.sectors:
             values["sectors"] = [[low, high % FULL_TURN] for low, high in self.sectors]
         if self.north_sigma is not None:
@@ -262,7 +281,7 @@ class View(Signature):
             )
 
     @classmethod
-    def of(cls, signature: Signature, **more: Any) -> View:  # noqa: ANN401 - any field
+    def of(cls, signature: Signature, **more: Any) -> View:  # noqa: ANN401 - any fields
         """Return a signature as a view, with fields replaced by `more`."""
         if isinstance(signature, View):
             return replace(signature, **more) if more else signature
@@ -350,18 +369,21 @@ class View(Signature):
         turned = replace(self, bearings=bearings, photos=photos)
         return turned.select(np.argsort(bearings, kind="stable"))
 
-    def to_dict(self, taxonomy: Taxonomy) -> dict[str, Any]:
+    def to_dict(self, taxonomy: Taxonomy) -> ViewRecord:
         """Return the values of `Signature.to_dict` and the details, for JSON and `parse_view`.
 
         ``ranges`` and ``range_errors`` have None for unknown values; ``scores`` are by name of the
         class. The values of `Photo.to_dict` are on the same level for one photo; for several
         photos, they are in ``photos``, and ``photo`` has the number of the photo of each object.
         """
-        values = super().to_dict(taxonomy)
-        for name in ("ranges", "range_errors"):
-            column = getattr(self, name)
-            if column is not None:
-                values[name] = [None if math.isnan(value) else value for value in column.tolist()]
+        plain = super().to_dict(taxonomy)
+        values = ViewRecord(
+            types=plain["types"], bearings=plain["bearings"], length=plain["length"]
+        )
+        if self.ranges is not None:
+            values["ranges"] = _none_for_nan(self.ranges)
+        if self.range_errors is not None:
+            values["range_errors"] = _none_for_nan(self.range_errors)
         if self.scores is not None:
             names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: "unknown"}
             values["scores"] = [
@@ -369,6 +391,11 @@ class View(Signature):
                 for row in self.scores
             ]
         if len(self.photos) == 1:
-            return values | self.photos[0].to_dict()
-        photos = [photo.to_dict() for photo in self.photos]
-        return values | {"photos": photos, "photo": self.photo_rows.tolist()}
+            return {**values, **self.photos[0].to_dict()}
+        values["photos"] = [photo.to_dict() for photo in self.photos]
+        values["photo"] = self.photo_rows.tolist()
+        return values
+
+
+def _none_for_nan(column: NDArray[np.float64]) -> list[float | None]:
+    return [None if math.isnan(value) else value for value in column.tolist()]

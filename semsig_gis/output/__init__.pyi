@@ -127,6 +127,9 @@ from .tables.answer import city_candidates as city_candidates
 from .tables.answer import likeliest_city as likeliest_city
 from .tables.answer import question_tables as question_tables
 from .tables.answer import route_tables as route_tables
+from .tables.answer_records import LocalizeRecord as LocalizeRecord
+from .tables.answer_records import RouteRecord as RouteRecord
+from .tables.answer_records import SuggestRecord as SuggestRecord
 from .tables.database import companion_table as companion_table
 from .tables.database import database_tables as database_tables
 from .tables.evaluation import comparison_sentence as comparison_sentence

@@ -10,7 +10,7 @@ cell. For an answer, ``.geojson`` and ``.kml`` (`output.files.answers`) hold all
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -416,8 +416,8 @@ def export_answer(
         )
     regions = search_regions(answer, database, share=share, within=within)
     if suffix in _RASTER and answer.chances is not None:
-        facts = answer.to_dict()
-        facts = {name: facts[name] for name in RASTER_FACTS}
+        values: Mapping[str, Any] = answer.to_dict()
+        facts = {name: values[name] for name in RASTER_FACTS}
         export_geotiff(database, answer.chances, path, name="posterior", facts=facts)
     elif suffix in _ANSWER:
         _ANSWER[suffix](answer_layers(answer, database, regions), path)

@@ -230,7 +230,7 @@ class Question:
 
     def rows(self, taxonomy: Taxonomy) -> list[dict[str, Any]]:
         """Return the views as rows of JSON lines for `semsig localize --queries`."""
-        rows = [view.to_dict(taxonomy) for view in self.views]
+        rows = [dict[str, Any](view.to_dict(taxonomy)) for view in self.views]
         for row, leg in zip(rows[1:], self.legs, strict=True):
             row |= {"dx": leg.dx, "dy": leg.dy, "sigma": leg.sigma}
         return rows

@@ -85,6 +85,7 @@ if TYPE_CHECKING:
         LikelihoodLocator,
         Location,
         Noise,
+        QuestionRecord,
     )
     from semsig_gis.serve.question import PagePhoto
 
@@ -423,7 +424,7 @@ class Workbench:
             self._last = key, locations
         return question, self._last[1][question.place_number]
 
-    def suggest(self, body: object) -> list[dict[str, Any]]:
+    def suggest(self, body: object) -> list[QuestionRecord]:
         """Return what to look for next, with the largest expected gain first."""
         question, location = self._located(body)
         suggestions = next_questions(self._index(question), location, absent=question.absent)

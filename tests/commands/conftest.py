@@ -19,7 +19,7 @@ from semsig_gis.database import open_database, save_database
 from semsig_gis.objects import save_objects, save_surroundings
 
 X, Y = 770_000.0, 6_280_000.0
-ROWS = [f"{X + 23 * i + 5},{Y + 31 * (i % 3)},DD,{30 + i};270" for i in range(15)]
+ROWS = [f"{X + 23 * i + 5},{Y + 31 * (i % 3)},DD,{30 + i};{264 + i}" for i in range(15)]
 SAMPLES = "\n".join(["x,y,types,bearings", *ROWS, ""]).replace(";", " ")
 BOXES = {
     "images": [{"id": 1, "file_name": "a.jpg", "width": 4000, "height": 3000}],

@@ -77,7 +77,7 @@ def test_load_build_and_localize(run_ok: RunOk) -> None:
 
 @pytest.mark.usefixtures("city")
 def test_evaluate_and_map(run_ok: RunOk) -> None:
-    line = "evaluate city.parquet --queries 30 --distortion light --seed 5 --method edit+edit:20%"
+    line = "evaluate city.parquet --queries 30 --distortion light --method edit+edit:20% --seed 5"
     summary = json.loads(run_ok(line, "--out", "eval", "--json"))
     assert summary["settings"]["queries"] == 30
     assert summary["settings"]["method"] == "edit+edit:20%"

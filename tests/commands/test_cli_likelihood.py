@@ -347,7 +347,7 @@ def test_noise_is_learnt_and_used(city: Path, run: Run) -> None:
     assert detection["samples"] == report["objects"]
     noise = open_noise(out)
     assert noise.name == "noise"
-    assert noise.to_dict()["position_sigma"] == 0.0
+    assert {spec.position_sigma for spec in noise.specs} == {0.0}
     query = "localize", city, *options(VIEW), "--refine", "--json", "--noise", out
     answer = json.loads(run(*query)[1])
     assert answer["noise"] == "noise"
@@ -399,7 +399,7 @@ def test_ranges_and_fading_are_learnt_and_printed(city: Path, run: Run) -> None:
     assert code == 0, err
     for words in ("range_sigma", "detection at 6 m", "detection at 30 m"):
         assert words in printed
-    assert open_noise(out).to_dict()["range_sigma"] == pytest.approx(0.2, abs=0.02)
+    assert open_noise(out).specs[0].range_sigma == pytest.approx(0.2, abs=0.02)
 
 
 def test_noise_is_learnt_from_views_of_unknown_places(city: Path, run: Run) -> None:
@@ -443,9 +443,9 @@ def test_map_age_is_printed_and_corrects_learnt_noise(city: Path, run: Run) -> N
     learn = "learn", city, "--samples", file, "--out", out
     plain = json.loads(run(*learn, "--json")[1])["spec"]
     printed = run(*learn, *old)[1]
-    spec = open_noise(out).to_dict()
-    assert f"detection {spec['detection']:.3f} (was {plain['detection']:.3f})" in printed
-    assert spec["detection"] > 0.95 > plain["detection"]
+    (spec,) = open_noise(out).specs
+    assert f"detection {spec.detection:.3f} (was {plain['detection']:.3f})" in printed
+    assert spec.detection > 0.95 > plain["detection"]
     rules = []
     for more in ((), old):
         rule = city.with_name("rule.json")
@@ -476,7 +476,7 @@ def test_noise_is_learnt_without_a_store(city: Path, run: Run) -> None:
         code, _, err = run("learn", database, "--samples", file, "--out", out)
         assert code == 0
         assert ("no street objects found" in err) == (database != city)
-        assert open_noise(out).to_dict()["position_sigma"] == 0.0
+        assert {spec.position_sigma for spec in open_noise(out).specs} == {0.0}
 
 
 def test_rule_is_calibrated_and_used(city: Path, run: Run) -> None:

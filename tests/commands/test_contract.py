@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import json
 import os
+import shlex
 from typing import TYPE_CHECKING, Any
 
 import jsonschema
 import pytest
 from sentences import sentence
 
-from semsig_gis.commands import commands
+from semsig_gis.commands import Result, command_line, commands
 from semsig_gis.commands.schema import command_schema
 
 if TYPE_CHECKING:
@@ -35,7 +37,7 @@ LINES: dict[str, tuple[str, ...]] = {
     "merge": ("first=city.parquet", "second=city.parquet", "out=c.parquet"),
     "info": ("database=city.parquet",),
     "clean": ("database=city.parquet",),
-    "localize": ("database=city.parquet", "types=DX", "out=answer.gpkg", "map=m.html"),
+    "localize": ("database=city.parquet", "types=DX", "out=answer.gpkg", "map_=m.html"),
     "route": ("database=city.parquet", "views=route.jsonl"),
     "suggest": ("database=city.parquet", "types=DX"),
     "serve": ("database=city.parquet",),
@@ -55,6 +57,14 @@ LINES: dict[str, tuple[str, ...]] = {
 }
 # Fields that need other values as well, or are read after another file that cannot be used.
 OTHERS: dict[tuple[str, str], tuple[dict[str, str], str]] = {
+    **{
+        (name, "drift_report"): ({"map_age": "3"}, "nowhere.parquet")
+        for name in ("localize", "route", "suggest", "learn", "calibrate", "evaluate")
+    },
+    ("localize", "queries"): ({"types": "", "out": "", "map_": ""}, "nowhere.parquet"),
+    ("benchmark", "noise"): ({}, "flatlandia.toml"),
+    ("learn", "unlabelled"): ({"samples": ""}, "nowhere.parquet"),
+    ("learn", "noise"): ({"samples": "", "unlabelled": "route.jsonl"}, "nowhere.parquet"),
     ("build", "streets"): ({"viewpoints": "streets"}, "nowhere.parquet"),
     ("view", "detector"): ({}, "boxes.json cannot be read"),
 }
@@ -64,11 +74,11 @@ RUN = [name for name in COMMANDS if name not in NOT_RUN]
 
 
 def line_of(name: str, /, **changes: str) -> list[str]:
-    """Return the words of the use of a command, with other values of some fields."""
+    """Return the words of the use of a command, with other values of some fields or none ("")."""
     values = dict(item.split("=", 1) for item in LINES[name]) | changes
     words = [name]
     for field in COMMANDS[name].fields:
-        if field.name in values:
+        if values.get(field.name):
             words += ([] if field.option.positional else [field.flag]) + [values[field.name]]
     return words
 
@@ -212,14 +222,37 @@ def test_interrupt_and_full_disk_leave_no_new_file(
     assert files(city) == before
 
 
+@pytest.mark.usefixtures("unchanged")
 @pytest.mark.parametrize("name", COMMANDS)
 def test_interrupt_in_the_work_ends_the_command(
-    name: str, city: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+    name: str, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(COMMANDS[name].request, "run", interrupted)
-    before = files(city)
     assert run("", *line_of(name)) == (130, "", "semsig: interrupted\n")
-    assert files(city) == before
+
+
+@pytest.mark.usefixtures("unchanged")
+@pytest.mark.parametrize("name", COMMANDS)
+def test_request_fits_its_schema_and_is_given_again_by_its_command_line(
+    name: str, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    requests: list[Any] = []
+
+    def keep(request: object, _: object) -> Result:
+        requests.append(request)
+        return Result()
+
+    monkeypatch.setattr(COMMANDS[name].request, "run", keep)
+    assert run("", *line_of(name))[0] == 0
+    (request,) = requests
+    program, *words = shlex.split(command_line(request))
+    assert program == "semsig"
+    assert run("", *words)[0] == 0
+    assert requests == [request, request]
+    schema = command_schema(COMMANDS[name])["request"]
+    jsonschema.Draft202012Validator.check_schema(schema)
+    values = json.loads(json.dumps(dataclasses.asdict(request), default=str))
+    jsonschema.validate(values, schema)

@@ -92,7 +92,7 @@ def test_bearings_are_converted_from_and_to_their_north() -> None:
     rows, others = (item["candidates"][0]["explanation"]["rows"] for item in (values, expected))
     for name in ("query_bearing", "object_bearing"):
         here, there = (
-            np.array(sorted(row[name] for row in part if row[name] is not None))
+            np.array(sorted(value for row in part if (value := row[name]) is not None))
             for part in (rows, others)
         )
         assert np.allclose(np.sort((here + 12.0) % 360.0), there)

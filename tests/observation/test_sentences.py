@@ -18,7 +18,7 @@ from semsig_gis.observation import GUESS_ERROR, Photo, parse_view
 from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
-    from semsig_gis.observation import View
+    from semsig_gis.observation import View, ViewRecord
 
 TAXONOMY = load_catalog("openstreetmap").taxonomy
 
@@ -27,7 +27,7 @@ def read(row: dict[str, Any], radius: float = 30.0) -> View:
     return parse_view(row, taxonomy=TAXONOMY, radius=radius)
 
 
-def parsed(row: dict[str, Any]) -> dict[str, Any]:
+def parsed(row: dict[str, Any]) -> ViewRecord:
     return read(row).to_dict(TAXONOMY)
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.evaluation.identifiability.result import Identifiability
+    from semsig_gis.evaluation.identifiability.result import CheckRecord, Identifiability
     from semsig_gis.localization import LikelihoodIndex
 
 
@@ -100,10 +100,12 @@ class IdentifiabilityCheck(Displayed):
             "seed": self.seed,
         }
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> CheckRecord:
         """Return the fields as plain values for JSON, with None for NaN."""
         return {
-            **asdict(self),
+            "queries": self.queries,
+            "seed": self.seed,
+            "found": self.found,
             "correlations": {
                 name: finite_or_none(value) for name, value in self.correlations.items()
             },

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NotRequired
 
 import numpy as np
 import pyarrow as pa
+from typing_extensions import TypedDict
 
 from semsig_gis.core import (
     DatabaseError,
@@ -35,6 +36,53 @@ NAME = "identifiability"
 FORMAT = 2  # increase if the same cells and noise give other numbers, or other columns
 
 BANDS = (0.0, 0.1, 0.5, 0.9)  # lower ends of the ranges of `found` in which cells are counted
+
+
+BandRecord = TypedDict("BandRecord", {"from": float, "to": float, "cells": int, "share": float})
+"""The cells with a probability in a range."""
+
+
+class GainRecord(TypedDict):
+    """The gain of publishing a class, as plain values."""
+
+    code: int
+    symbol: str
+    name: str
+    title: str
+    chance_near: float
+    bits: float
+    objects: int | None
+    chance_near_per_1000: float | None
+
+
+class CheckRecord(TypedDict):
+    """A check as plain values, with None for NaN; `bins` have the fields of `ChanceBin`."""
+
+    queries: int
+    seed: int
+    found: float
+    correlations: dict[str, float | None]
+    attainable: float | None
+    bins: list[dict[str, float]]
+
+
+class IdentifiabilityRecord(TypedDict):
+    """The identifiability of a city as plain values; `check` is that of `semsig identify`."""
+
+    cells: int
+    noise: str
+    radius_m: float
+    view_degrees: float
+    trials: int
+    seed: int
+    chance_itself: float
+    chance_near: float
+    chance_found: float
+    bits_left: float
+    cell_bits: float
+    bands: list[BandRecord]
+    classes: list[GainRecord]
+    check: NotRequired[CheckRecord]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,7 +218,7 @@ class Identifiability(Displayed):
             "classes": [asdict(gain) for gain in self.classes],
         }
 
-    def summary(self, *, object_counts: Mapping[int, int] | None = None) -> dict[str, Any]:
+    def summary(self, *, object_counts: Mapping[int, int] | None = None) -> IdentifiabilityRecord:
         """Return a summary of the city as plain values for JSON.
 
         Probabilities and bits are means over the cells; ``bands`` count the cells by their
@@ -180,13 +228,16 @@ class Identifiability(Displayed):
         kinds = {item.code: item for item in self.database.taxonomy.classes}
         cells = len(self.database)
         counts = np.bincount(np.digitize(self.found, BANDS) - 1, minlength=len(BANDS)).tolist()
-        classes = []
+        classes: list[GainRecord] = []
         for gain in sorted(self.classes, key=lambda item: -item.near):
             kind = kinds[gain.code]
             objects = None if object_counts is None else int(object_counts.get(gain.code, 0))
             classes.append(
                 {
-                    **{key: getattr(kind, key) for key in ("code", "symbol", "name", "title")},
+                    "code": kind.code,
+                    "symbol": kind.symbol,
+                    "name": kind.name,
+                    "title": kind.title,
                     "chance_near": gain.near,
                     "bits": gain.bits,
                     "objects": objects,

@@ -13,6 +13,8 @@ from semsig_gis.core import EmptyResultError, crs_label, map_with
 from semsig_gis.database import PartitionedDatabase, join_databases, rows_of_result
 from semsig_gis.localization.answers import (
     Answer,
+    AnswerRecord,
+    CandidateRecord,
     Ranking,
     candidate_columns,
     check_top,
@@ -34,6 +36,24 @@ if TYPE_CHECKING:
     from semsig_gis.localization.distance.method import Method
     from semsig_gis.localization.requirement import Requirement
     from semsig_gis.observation import North
+
+
+class RankedRecord(CandidateRecord):
+    """A candidate with its distance; tied cells share their ranks."""
+
+    rank_low: int
+    rank_high: int
+    tied: int
+    distance: float
+
+
+class LocalizationRecord(AnswerRecord):
+    """An answer by distance as plain values."""
+
+    method: str
+    used: str
+    tied_beyond: int
+    candidates: list[RankedRecord]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -96,7 +116,7 @@ class Localization(Answer):
         """Return a map of the candidates for a notebook (see `localization_map`)."""
         return map_with("localization_map", self, database)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> LocalizationRecord:
         """Return plain values for JSON; ``candidates`` is a list of records.
 
         These have the names of `columns` and ``lon``, ``lat`` (degrees, WGS 84).

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from typing_extensions import TypedDict
 
 from semsig_gis.core import WILDCARD, Displayed, InputError, ObjectIndex, cell_ids
 from semsig_gis.database import SignatureDatabase, visible_objects_at, visible_objects_in
@@ -27,7 +28,7 @@ from semsig_gis.localization.learning.fit import (
 from semsig_gis.localization.learning.headings import turned_evidence
 from semsig_gis.localization.learning.level_weights import detection_levels
 from semsig_gis.localization.noise.levels import level_mixture
-from semsig_gis.localization.noise.model import NoiseSpec
+from semsig_gis.localization.noise.model import MixtureRecord, NoiseSpec, SpecRecord
 from semsig_gis.observation import RADIUS_M, SEEN, View, check_north, parse_view
 from semsig_gis.storage import read_rows, row_value
 
@@ -144,6 +145,51 @@ def _sample(row: Row, taxonomy: Taxonomy, radius: float) -> Sample:
     return Sample(signature=signature, cell_id=None if cell is None else int(cell))
 
 
+RateRecord = TypedDict(
+    "RateRecord",
+    {
+        "quantity": str,
+        "class": str,
+        "distance": float | None,
+        "value": float,
+        "own": float | None,
+        "low_90": float | None,
+        "high_90": float | None,
+        "low_95": float | None,
+        "high_95": float | None,
+        "samples": float,
+    },
+)
+"""A row of `NoiseEstimate.rates` as plain values."""
+
+
+class VerdictRecord(TypedDict):
+    """Whether the samples suffice for a quantity, and the classes with few of their own."""
+
+    enough: bool
+    few: list[str]
+
+
+class LearntRecord(TypedDict):
+    """A noise model that was learnt, as plain values."""
+
+    spec: SpecRecord
+    levels: list[dict[str, float]]
+    rates: list[RateRecord]
+    confusion: dict[str, dict[str, float]]
+    samples: int
+    objects: int
+    detections: int
+    skipped: int
+    rounds: int
+    log_likelihood: float
+    verdicts: dict[str, VerdictRecord]
+
+
+LearnRecord = LearntRecord | SpecRecord | MixtureRecord
+"""What is learnt: with the intervals from known places, else only the noise model."""
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class NoiseEstimate(Displayed):
     """A learnt noise model with its uncertainty.
@@ -183,14 +229,14 @@ class NoiseEstimate(Displayed):
         }
 
     @property
-    def verdicts(self) -> dict[str, dict[str, Any]]:
+    def verdicts(self) -> dict[str, VerdictRecord]:
         """Whether the samples suffice, by quantity.
 
         They are ``enough`` if the 90 % interval of all classes together is within a factor of 1.5,
         or at most 0.05 wide; ``few`` are the classes with fewer than 8 samples of their own, which
         depend more on the rate of all classes than on these.
         """
-        verdicts = {}
+        verdicts: dict[str, VerdictRecord] = {}
         for quantity, rows in self.rates.groupby("quantity", sort=False):
             low, high = rows.loc[rows["class"] == ALL, ["low_90", "high_90"]].to_numpy().T
             narrow = (high <= NARROW_FACTOR * low) | (high - low <= NARROW)
@@ -204,15 +250,21 @@ class NoiseEstimate(Displayed):
         """The model with its levels: a mixture, or `spec` if the levels explain hardly more."""
         return level_mixture(self.spec, self.levels)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> LearntRecord:
         """Return plain values for JSON; ``confusion`` is by true class, then given class."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        plain = self.rates.astype(object).where(self.rates.notna(), None)
-        return values | {
+        rates: Any = self.rates.astype(object).where(self.rates.notna(), None).to_dict("records")
+        confusion: Any = self.confusion.to_dict("index")
+        return {
             "spec": self.spec.to_dict(),
             "levels": [asdict(level) for level in self.levels],
-            "rates": plain.to_dict("records"),
-            "confusion": self.confusion.to_dict("index"),
+            "rates": rates,
+            "confusion": confusion,
+            "samples": self.samples,
+            "objects": self.objects,
+            "detections": self.detections,
+            "skipped": self.skipped,
+            "rounds": self.rounds,
+            "log_likelihood": self.log_likelihood,
             "verdicts": self.verdicts,
         }
 

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from semsig_gis.core import InputError, binomial_tail, check_fields, number, read_table
 from semsig_gis.storage import parse_json, read_whole, whole_file
@@ -33,6 +34,19 @@ _Share = Annotated[
     float, number("a share above 0 and below 1", 0, math.nextafter(1, 0), above=True)
 ]
 _Count = Annotated[int, number("a number of queries", 0, whole=True)]
+
+
+class RuleRecord(TypedDict):
+    """A rule as plain values; the threshold is None if nothing is answered."""
+
+    threshold: float | None
+    radius: float
+    precision: float
+    confidence: float
+    queries: int
+    answered: int
+    wrong: int
+    coverage: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +90,19 @@ class AnswerRule:
     def coverage(self) -> float:
         """Share of the queries of the calibration that were answered; NaN without any."""
         return self.answered / self.queries if self.queries else math.nan
+
+    def to_dict(self) -> RuleRecord:
+        """Return plain values for JSON, with the coverage of the calibration."""
+        return {
+            "threshold": self.threshold if math.isfinite(self.threshold) else None,
+            "radius": self.radius,
+            "precision": self.precision,
+            "confidence": self.confidence,
+            "queries": self.queries,
+            "answered": self.answered,
+            "wrong": self.wrong,
+            "coverage": self.coverage,
+        }
 
     def answers(self, mass: float) -> bool:
         """Whether to answer, by the chance that the place is near the best one."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from semsig_gis.core import Displayed, signed_degrees
 from semsig_gis.localization.likelihood.association import score_associations
@@ -25,6 +26,27 @@ MOST_CELLS = 200
 """Likeliest cells near the answer that are averaged; the others are negligible."""
 ELLIPSE_STEPS = 72
 HEADING_STEP = 2.0  # degrees between the headings that are tried
+
+
+class EllipseRecord(TypedDict):
+    """Half axes in metres, and the bearing of the longer one."""
+
+    longer: float
+    shorter: float
+    bearing: float
+
+
+class EstimateRecord(TypedDict):
+    """A place in metres and a heading in degrees, with their uncertainty."""
+
+    x: float
+    y: float
+    sigma: float
+    heading: float | None
+    heading_sigma: float | None
+    covariance: list[list[float]]
+    ellipse_90: EllipseRecord
+    refined: bool
 
 
 @dataclass(frozen=True, eq=False, repr=False, slots=True, kw_only=True)
@@ -82,7 +104,7 @@ class PlaceEstimate(Displayed):
         y = self.y + along * math.cos(turn) - across * math.sin(turn)
         return np.column_stack([x, y])
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> EstimateRecord:
         """Return plain values for JSON; the covariance has two rows if the heading is known."""
         size = 2 if self.heading is None else 3
         longer, shorter, bearing = self.ellipse(0.9)

@@ -9,9 +9,10 @@ import math
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, NotRequired, get_args
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from semsig_gis.core import SOURCE, SOURCE_ID, WILDCARD, Displayed, signed_degrees, wrap_degrees
 from semsig_gis.database import visible_objects_at, visible_objects_in
@@ -35,14 +36,49 @@ if TYPE_CHECKING:
 UNKNOWN_NAME = "unknown"
 LEAST_PAIR_CHANCE = 0.01  # that a detection is an object, to list them in one row
 LEAST_INSIDE = 0.5  # chance that the bearing of an object is in a sector, to count it as inside
-VERDICTS = ("matched", "misnamed", "missed", "false")
+Verdict = Literal["matched", "misnamed", "missed", "false"]
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 OUTSIDE = "outside"
 ROW_NUMBERS = ("query", "photo", "object")
-COLUMNS = [
-    *("verdict", "chance", "query", "photo", "query_class", "query_bearing", "query_range"),
-    *("object", "source", "source_id", "object_class", "object_bearing", "distance"),
-    "bearing_error",
-]
+
+
+class ExplanationRow(TypedDict):
+    """An object of the query, a street object, or both."""
+
+    verdict: Verdict | Literal["outside"]
+    chance: float
+    query: int | None
+    photo: int | None
+    query_class: str | None
+    query_bearing: float | None
+    query_range: float | None
+    object: int | None
+    source: str | None
+    source_id: str | None
+    object_class: str | None
+    object_bearing: float | None
+    distance: float | None
+    bearing_error: float | None
+
+
+class HeadingsRecord(TypedDict):
+    """The degrees added to the bearings of each photo, of several."""
+
+    headings: NotRequired[list[float]]
+
+
+class ExplanationRecord(HeadingsRecord):
+    """An explanation as plain values."""
+
+    x: float
+    y: float
+    heading: float
+    loglik: float
+    counts: dict[Verdict, int]
+    rows: list[ExplanationRow]
+
+
+COLUMNS = [*ExplanationRow.__annotations__]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -68,7 +104,7 @@ class Explanation(Displayed):
 
     def _facts(self) -> dict[str, object]:
         return {
-            **self.counts,
+            **{str(verdict): count for verdict, count in self.counts.items()},
             "place": f"{self.xy[0]:.1f}, {self.xy[1]:.1f}",
             "heading": ", ".join(f"{heading:.1f}°" for heading in self.headings),
         }
@@ -106,25 +142,28 @@ class Explanation(Displayed):
         return np.asarray(np.array(self.xy) + np.array(metres)[:, None] * away)
 
     @property
-    def counts(self) -> dict[str, int]:
+    def counts(self) -> dict[Verdict, int]:
         """The number of rows by verdict, without objects outside the sectors."""
         counts = Counter(row["verdict"] for row in self.rows)
         return {verdict: counts[verdict] for verdict in VERDICTS}
 
-    def to_dict(self, north: North = GRID_NORTH) -> dict[str, Any]:
+    def to_dict(self, north: North = GRID_NORTH) -> ExplanationRecord:
         """Return plain values for JSON; values that do not apply are None.
 
         Bearings count from `north`, not from grid north as in the table.
         """
-        rows = [{name: row[name] for name in COLUMNS} for row in self.rows]
+        rows: list[Any] = [{name: row[name] for name in COLUMNS} for row in self.rows]
         for row in rows:
             for name in ("query_bearing", "object_bearing"):
                 row[name] = None if row[name] is None else north.from_grid(row[name])
+        several: HeadingsRecord = (
+            {"headings": list(self.headings)} if len(self.headings) > 1 else {}
+        )
         return {
             "x": self.xy[0],
             "y": self.xy[1],
             "heading": self.heading,
-            **({"headings": list(self.headings)} if len(self.headings) > 1 else {}),
+            **several,
             "loglik": self.loglik,
             "counts": self.counts,
             "rows": rows,

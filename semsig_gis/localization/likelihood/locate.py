@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.explain import Explanation
     from semsig_gis.localization.likelihood.incremental import IncrementalIndex
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization.likelihood.location_record import LocationRecord
     from semsig_gis.localization.likelihood.posterior import Places, Posterior, Refinement
     from semsig_gis.observation import Leg, North
 
@@ -217,7 +218,7 @@ class Location(Answer):
         """Show the answer on a map in a notebook (see `location_map`)."""
         return map_with("location_map", self)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> LocationRecord:
         """Return everything except the chances of all cells as plain values for JSON.
 
         ``place`` has the keys of `PlaceEstimate.to_dict` and ``cell_id``, ``lon``, ``lat``,
@@ -231,7 +232,8 @@ class Location(Answer):
         candidates = self._candidate_records()
         for candidate, why in zip(candidates, self.explanations, strict=False):
             candidate["explanation"] = why.to_dict(self.north)
-        threshold = self.rule.threshold
+        threshold, ratio = self.rule.threshold, self.prior_ratio
+        prior: Any = None if ratio is None else {**self.known, "ratio": ratio}
         return {
             "query": self.query.to_dict(self.taxonomy),
             "north": self.north.to_dict(),
@@ -258,9 +260,7 @@ class Location(Answer):
                 "text": self.region_text,
             },
             "entropy_bits": self.posterior.entropy,
-            "prior": None
-            if self.prior_ratio is None
-            else {**self.known, "ratio": self.prior_ratio},
+            "prior": prior,
             "notes": list(self.notes),
             "crs": self.crs.to_string(),
             "licenses": list(self.licenses),

@@ -9,8 +9,8 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Self
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import geopandas as gpd
 import numpy as np
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization.answers import PositionRecord
 
 LEAST_SIGMA_M = 0.01
 FARTHEST_SIGMAS = 3.0  # of a position from the nearest cell, beyond the visibility range
@@ -104,9 +105,16 @@ class KnownPosition:
             )
         return near[0]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PositionRecord:
         """Return plain values, ready for JSON."""
-        return asdict(self)
+        return {
+            "x": self.x,
+            "y": self.y,
+            "lat": self.lat,
+            "lon": self.lon,
+            "sigma": self.sigma,
+            "read_as": self.read_as,
+        }
 
 
 def _readings(

@@ -14,6 +14,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from typing_extensions import TypedDict
+
 from semsig_gis.core import (
     HALF_TURN,
     Accepts,
@@ -73,6 +75,37 @@ _Fading = Annotated[
     ),
     Accepts("pairs of metres, ascending, and a share from 0 to 1"),
 ]
+
+
+class SpecRecord(TypedDict):
+    """The fields of `NoiseSpec` as plain values."""
+
+    detection: float
+    detection_by_class: dict[str, float]
+    misnamed: float
+    misnamed_by_class: dict[str, float]
+    confusion: dict[str, dict[str, float]]
+    clutter: float
+    clutter_shares: dict[str, float]
+    bearing_sigma: float
+    bearing_sigma_by_class: dict[str, float]
+    position_sigma: float
+    missed_each: float
+    misnamed_each: float
+    range_sigma: float
+    range_sigma_by_class: dict[str, float]
+    fading: dict[str, list[list[float]]]
+    repeat: float
+    general: bool
+    name: str
+
+
+class MixtureRecord(TypedDict):
+    """The fields of `NoiseMixture` as plain values."""
+
+    name: str
+    weights: list[float]
+    specs: list[SpecRecord]
 
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
@@ -188,9 +221,9 @@ class NoiseSpec(Displayed):
         """Return the model after a change; a mixture changes each of its models."""
         return change(self)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> SpecRecord:
         """Return plain values, ready for JSON, that `noise_from_dict` reads."""
-        values: dict[str, Any] = _plain(asdict(self))
+        values: SpecRecord = _plain(asdict(self))
         return values
 
 
@@ -253,7 +286,7 @@ class NoiseMixture(Displayed):
         """Return the mixture after a change of each of its models."""
         return replace(self, specs=tuple(map(change, self.specs)))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> MixtureRecord:
         """Return the mixture as plain values, ready for JSON, that `noise_from_dict` reads."""
         return {
             "name": self.name,

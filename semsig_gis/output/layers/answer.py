@@ -17,6 +17,8 @@ from semsig_gis.output.styles import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization import Answer, SearchRegions
     from semsig_gis.output.layers.model import Layer
@@ -30,9 +32,9 @@ def answer_layers(
     cells = CellTable(database.select(candidates["cell"].to_numpy()))
     columns = cells.columns(slice(0, len(candidates)))
     candidates = candidates.assign(bearings=columns["bearings"], distances=columns["distances"])
-    facts = answer.to_dict()
-    licenses, place = tuple(facts["licenses"]), facts.get("place")
-    facts = {name: facts[name] for name in facts if name not in {"candidates", "crs", "licenses"}}
+    values: Mapping[str, Any] = answer.to_dict()
+    licenses, place = tuple(values["licenses"]), values.get("place")
+    facts = {name: values[name] for name in values if name not in {"candidates", "crs", "licenses"}}
     facts["searched"] = regions.to_dict()
     layer = functools.partial(
         table_layer,

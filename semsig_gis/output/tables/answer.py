@@ -126,7 +126,7 @@ def likeliest_city(locations: Mapping[str, Location]) -> tuple[str, Location]:
 
 def city_candidates(locations: Mapping[str, Location], top: int) -> list[dict[str, Any]]:
     """Return the likeliest candidates of all cities as plain values, with the name of the city."""
-    rows = [
+    rows: list[dict[str, Any]] = [
         {"city": name, **candidate}
         for name, location in locations.items()
         for candidate in location.to_dict()["candidates"]

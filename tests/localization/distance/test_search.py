@@ -102,7 +102,7 @@ def test_answer_is_valid_json(types: str | None, bearings: list[float] | None) -
         "tied_beyond": result.tied_beyond,
         "licenses": ["trees: the city (CC0)"],
     }
-    assert {name: values[name] for name in expected} == expected
+    assert expected.items() <= values.items()
     assert [row["cell"] for row in values["candidates"]] == result.candidates["cell"].tolist()
     back = Transformer.from_crs("EPSG:4326", "EPSG:2154", always_xy=True)
     for row in values["candidates"]:

@@ -496,7 +496,7 @@ def test_objects_outside_the_photo_are_not_missed_or_counted() -> None:
     east = Photo.looking(heading=100, fov=60)
     query = View(np.array([LAMP]), np.array([92.0]), ranges=np.array([18.0]), photos=(east,))
     explanation = explained(query)
-    rows = explanation.to_dict()["rows"]
+    rows: list[Any] = explanation.to_dict()["rows"]
     verdicts = [(row["verdict"], row["object"]) for row in rows]
     assert verdicts == [("matched", 1), ("outside", 0), ("outside", 2)]
     assert (rows[0]["query_range"], rows[0]["distance"]) == (18.0, pytest.approx(20.0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import folium
 import numpy as np
@@ -93,7 +93,7 @@ def test_clicks_describe_places_and_objects(page: MapPage) -> None:
     assert f"{percent(location.answer.mass)} within 50 m" in text
     assert f"± {location.estimate.heading_sigma:.1f}°" in text
     text = page.panel_of(VERDICTS["matched"])
-    rows = location.explanations[0].to_dict()["rows"]
+    rows: list[Any] = location.explanations[0].to_dict()["rows"]
     matched = next(row for row in rows if row["verdict"] == "matched")
     title = CITY.taxonomy.by_name(matched["object_class"]).title
     for fact in ("Matched", title, matched["source_id"], f"{matched['distance']:.1f} m"):

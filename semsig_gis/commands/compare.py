@@ -1,0 +1,61 @@
+"""`semsig compare`: two results of queries from the same places."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.core import Table
+
+RESULT = Option(
+    "Folder of an experiment or of an evaluation.",
+    title="Folder of results",
+    metavar="FOLDER",
+    positional=True,
+    reads=True,
+)
+
+
+@command(
+    "compare",
+    title="Compare results",
+    group="Accuracy",
+    order=3,
+    returns="semsig_gis.evaluation:ComparisonRecord",
+)
+@dataclass(frozen=True, kw_only=True)
+class Compare:
+    """Compare two results of queries from the same places."""
+
+    first: Annotated[Path, RESULT]
+    second: Annotated[Path, RESULT]
+
+    def run(self, _reporter: Reporter) -> Result:
+        """Return the differences of the figures by the name of the case."""
+        from semsig_gis.evaluation import (
+            changed_successes,
+            common_cases,
+            compare_evaluations,
+            open_results,
+            plain_records,
+        )
+        from semsig_gis.output import comparison_sentence, comparison_table
+
+        pairs = common_cases(open_results(self.first), open_results(self.second))
+        tables = {name: compare_evaluations(*pair) for name, pair in pairs.items()}
+
+        def text() -> Iterator[str | Table]:
+            names = str(self.first), str(self.second)
+            for name, table in tables.items():
+                case = f"{name}: " * bool(name)
+                changed = changed_successes(*pairs[name])
+                yield case + comparison_sentence(table, changed, names=names)
+                yield comparison_table(table, f"{case}{self.first} and {self.second}")
+
+        return Result(
+            values=lambda: {name: plain_records(table) for name, table in tables.items()},
+            text=text(),
+        )

@@ -1,0 +1,62 @@
+"""`semsig experiment`: the evaluations of an experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.commands.options import Scheduler, Workers
+from semsig_gis.core import Table
+
+
+@command(
+    "experiment",
+    title="Run an experiment",
+    group="Accuracy",
+    order=2,
+    returns="semsig_gis.evaluation:ExperimentRecord",
+)
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """Run the evaluations of an experiment, or resume them."""
+
+    spec: Annotated[
+        Path, Option("Experiment, a .toml file.", title="Experiment", positional=True, reads=True)
+    ]
+    out: Annotated[
+        Path,
+        Option(
+            "Folder to write the results to.",
+            title="Folder for the results",
+            metavar="FOLDER",
+            writes="",
+        ),
+    ]
+    workers: Workers = 0
+    scheduler: Scheduler = None
+
+    def run(self, reporter: Reporter) -> Result:
+        """Write the results; return the figures of each evaluation by its name."""
+        from semsig_gis.evaluation import experiment_tables, open_experiment_spec, run_experiment
+
+        spec = open_experiment_spec(self.spec)
+        with reporter.progress("answering") as advance:
+            results = run_experiment(
+                spec,
+                self.out,
+                folder=self.spec.parent,
+                workers=self.workers,
+                scheduler=self.scheduler,
+                progress=advance,
+            )
+
+        def text() -> Iterator[str | Table]:
+            yield from experiment_tables(spec, results)
+            yield f"results: {self.out}"
+
+        return Result(
+            values=lambda: {name: item.summary() for name, item in results.items()}, text=text()
+        )
