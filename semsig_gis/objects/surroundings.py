@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import geopandas as gpd
 import numpy as np
 import shapely
+from pyproj import CRS
 
 from semsig_gis.core import CLASS_NAME, LICENSES, InputError, SourceError
 from semsig_gis.objects.table import layer_licences
@@ -26,6 +26,7 @@ from semsig_gis.sources import (
     read_layer,
     read_parquet,
     reader,
+    transformed,
 )
 from semsig_gis.storage import (
     GROUP_ROWS,
@@ -38,7 +39,7 @@ from semsig_gis.storage import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from pyproj import CRS
+    import geopandas as gpd
 
     from semsig_gis.sources import GeometryKind, RawLayer
 
@@ -63,6 +64,7 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
     Examples
     --------
     >>> import tempfile
+    >>> import geopandas as gpd
     >>> houses = gpd.GeoDataFrame(
     ...     geometry=[shapely.box(0, 0, 5, 5), shapely.box(90, 0, 95, 5)], crs="EPSG:2154"
     ... )
@@ -121,6 +123,7 @@ def read_surroundings(
     Examples
     --------
     >>> import tempfile
+    >>> import geopandas as gpd
     >>> house = shapely.box(*demo_objects.xy[0], *(demo_objects.xy[0] + 5.0))
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = f"{folder}/houses.parquet"
@@ -140,7 +143,7 @@ def select_role(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) 
     if not has_element_columns(frame_fields(table)):
         return table
     (layer,) = frame_layers(table, [load_catalog("openstreetmap").layer(role)])
-    if layer.table.empty:
+    if not len(layer):
         raise InputError(f"the table of OpenStreetMap's elements has no {role}; give one that has.")
     return _with_licences(layer)
 
@@ -161,10 +164,10 @@ def read_area(
     """
     if isinstance(area, str | Path) and NUMBERS.fullmatch(str(area)):
         box = shapely.segmentize(parse_area(str(area)).polygon, EDGE_DEGREES)
-        shapes = gpd.GeoSeries([box], crs=WGS84).to_crs(crs)
+        shapes = transformed(np.array([box]), WGS84, CRS.from_user_input(crs))
     else:
-        shapes = _read(area, "area", crs).geometry
-    joined = join_areas(shapes.to_numpy())
+        shapes = _read(area, "area", crs).geometry.to_numpy()
+    joined = join_areas(shapes)
     if joined is None:
         raise InputError(f"{_named(area)} encloses no area; give {_of_kind(area, 'polygon')}.")
     return joined
@@ -180,7 +183,7 @@ def _read(
     kind = KIND_OF[role]
     notes: tuple[str, ...] = ()
     where = _named(path)
-    if isinstance(path, gpd.GeoDataFrame):
+    if not isinstance(path, str | Path):
         table = path if role == "area" else select_role(path, role)
         table = table if box is None else table.iloc[np.sort(table.sindex.intersection(box))]
     else:
@@ -201,11 +204,11 @@ def _read(
 
 
 def _named(path: object) -> str:
-    return "the table" if isinstance(path, gpd.GeoDataFrame) else str(path)
+    return "the table" if not isinstance(path, str | Path) else str(path)
 
 
 def _of_kind(path: object, kind: str) -> str:
-    return f"a {'table' if isinstance(path, gpd.GeoDataFrame) else 'file'} of {kind}s"
+    return f"a {'table' if not isinstance(path, str | Path) else 'file'} of {kind}s"
 
 
 def _read_file(

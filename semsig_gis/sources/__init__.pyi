@@ -57,6 +57,8 @@ from .http.fetch import read_text as read_text
 from .layer import RawLayer as RawLayer
 from .layer import Reader as Reader
 from .layer import RowCounts as RowCounts
+from .layer import transform_points as transform_points
+from .layer import transformed as transformed
 from .layer_spec import CLASS_BY_KEYS as CLASS_BY_KEYS
 from .layer_spec import LAYER_KEYS as LAYER_KEYS
 from .layer_spec import WIDTH_BY_KEYS as WIDTH_BY_KEYS

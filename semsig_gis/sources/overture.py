@@ -7,7 +7,7 @@ import json
 import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
@@ -21,20 +21,21 @@ from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.filters import ANY_VALUE, as_text
 from semsig_gis.sources.http.cache import cache_key, checksum
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, cached_file
-from semsig_gis.sources.osm.elements import ElementLayer, TagIndex
+from semsig_gis.sources.osm.elements import TagIndex, element_layers
+from semsig_gis.sources.rows import WGS84
 from semsig_gis.storage import groups_meeting, parse_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
-    from shapely.geometry.base import BaseGeometry
 
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
+    from semsig_gis.sources.rows import LayerBuilder
 
     Boxes = Sequence[tuple[float, float, float, float]]
 
@@ -72,14 +73,14 @@ def read_layers(
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} files"
-    layers = [_FeatureLayer(spec, filters=filters, where=where) for spec in specs]
+    layers = element_layers(specs, filters=filters, where=where)
     for file in paths:
         present = [layer for layer in layers if _may_hold(str(file), layer.spec)]
         if present:
             present_specs = [layer.spec for layer in present]
             for table in _slices(fs.LocalFileSystem(), str(file), present_specs, _boxes(area)):
                 _add_rows(table, present)
-    return tuple(layer.raw(crs) for layer in layers)
+    return tuple(layer.layer(WGS84, requested=crs) for layer in layers)
 
 
 def _may_hold(path: str, spec: LayerSpec) -> bool:
@@ -89,20 +90,7 @@ def _may_hold(path: str, spec: LayerSpec) -> bool:
     return parts.get("theme", theme) == theme and parts.get("type", kind) == kind
 
 
-class _FeatureLayer(ElementLayer):
-    """A layer during the reading of features that have its tags."""
-
-    def add_feature(self, values: Mapping[str, Any], name: str, shape: BaseGeometry | None) -> None:
-        """Add a feature if its type of geometry is one of the layer's ``elements``."""
-        self.rows.read += 1
-        kind = None if shape is None else KIND_BY_GEOMETRY.get(shape.geom_type)
-        if kind not in {*self.spec.elements, None}:
-            self.rows.filtered += 1
-            return
-        self.rows.add([values.get(field) for field in self.rules.fields], name, shape)
-
-
-def _add_rows(table: pa.Table, layers: Sequence[_FeatureLayer]) -> None:
+def _add_rows(table: pa.Table, layers: Sequence[LayerBuilder]) -> None:
     """Add the rows of a table to the layers that they belong to by their tags."""
     index = TagIndex([layer.spec for layer in layers])
     geometry = table.column(GEOMETRY)
@@ -110,25 +98,17 @@ def _add_rows(table: pa.Table, layers: Sequence[_FeatureLayer]) -> None:
     if isinstance(geometry.type, pa.BaseExtensionType):  # a column with the type of GeoArrow
         geometry = geometry.storage
     shapes = shapely.from_wkb(geometry.to_numpy(zero_copy_only=False), on_invalid="ignore")
-    columns = {
-        name: table.column(name).to_pylist()
-        for name in table.column_names
-        if name not in {GEOMETRY, SOURCE_TAGS} and not name.startswith(f"{BOX}.")
-    }
-    source_tags = (
-        table.column(SOURCE_TAGS).to_pylist()
-        if SOURCE_TAGS in table.column_names
-        else [None] * len(table)
-    )
-    names = columns.get("id", [""] * len(table))
-    for number, (row, tags) in enumerate(
-        zip(zip(*columns.values(), strict=True), source_tags, strict=True)
-    ):
-        own = zip(columns, row, strict=True)
-        values = {**dict(tags or ()), **{key: value for key, value in own if value is not None}}
+    own = [n for n in table.column_names if n != GEOMETRY and not n.startswith(f"{BOX}.")]
+    for row, shape in zip(table.select(own).to_pylist(), shapes, strict=True):
+        values = {key: value for key, value in row.items() if value is not None}
+        values = {**dict(values.pop(SOURCE_TAGS, ())), **values}
         texts = {key: as_text(value) for key, value in values.items() if value is not None}
-        for place in index.layers(texts):
-            layers[place].add_feature(values, str(names[number] or ""), shapes[number])
+        kind = None if shape is None else KIND_BY_GEOMETRY.get(shape.geom_type)
+        for layer in (layers[number] for number in index.layers(texts)):
+            if kind in {*layer.spec.elements, None}:
+                layer.rows.add(values, str(row.get("id") or ""), shape)
+            else:
+                layer.rows.skip()
 
 
 # --- The needed parts of a file -------------------------------------------------------------------

@@ -45,6 +45,9 @@ EMPTY_BOX = (math.inf, math.inf, -math.inf, -math.inf)
 GROUP_ROWS = 8192
 """Rows of a row group: the street objects of about two square kilometres of Paris."""
 
+CURVE_SIDE = 2**16 - 1
+"""Steps of the Hilbert curve on each side."""
+
 BATCH_ROWS = 1 << 15
 """Rows that are decompressed at once if the whole file is read."""
 
@@ -52,14 +55,29 @@ BATCH_ROWS = 1 << 15
 def hilbert_order(geometries: NDArray[np.object_] | gpd.array.GeometryArray) -> NDArray[np.int64]:
     """Return the permutation that sorts geometries along a Hilbert curve.
 
-    No geometry may be missing or empty; equal ones keep their order.
+    No geometry may be missing or empty; equal ones keep their order. The curve is that of
+    geopandas, which takes 0.7 s to import.
     """
-    if len(geometries) == 0:
+    bounds = shapely.bounds(np.asarray(geometries))
+    middle = (bounds[:, :2] + bounds[:, 2:]) / 2
+    if not len(middle):
         return np.empty(0, np.int64)
-    import geopandas as gpd  # noqa: PLC0415 - 0.7 s
-
-    distances = gpd.GeoSeries(geometries).hilbert_distance().to_numpy()
-    return np.argsort(distances, kind="stable")
+    span = np.ptp(middle, axis=0)
+    steps = (middle - middle.min(axis=0)) * np.divide(
+        CURVE_SIDE, span, where=span > 0, out=0 * span
+    )
+    x, y = np.clip(steps, 0, CURVE_SIDE).astype(np.int64).T
+    distance = np.zeros(len(x), np.int64)
+    side = (CURVE_SIDE + 1) // 2
+    while side:
+        east, north = (x & side) > 0, (y & side) > 0
+        distance += side * side * ((3 * east) ^ north)
+        # Turn the quarter as the curve runs through it.
+        turned = ~north
+        x, y = np.where(turned & east, ~x, x), np.where(turned & east, ~y, y)
+        x, y = np.where(turned, y, x), np.where(turned, x, y)
+        side //= 2
+    return np.argsort(distance, kind="stable")
 
 
 def bounds_column(bounds: ArrayLike) -> pa.StructArray:

@@ -1,9 +1,9 @@
-"""Describe and read layers of vector files with pyogrio, all rows at once."""
+"""Describe layers of vector files with pyogrio, and read all their rows at once, in Arrow."""
 
 from __future__ import annotations
 
 import contextlib
-import datetime as dt
+import itertools
 import math
 import struct
 import threading
@@ -12,13 +12,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 import pyogrio
 import shapely
 from pyogrio.raw import open_arrow, read
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
-from semsig_gis.sources.rows import Rows
+from semsig_gis.sources.rows import Rows, plain, usable_crs
+from semsig_gis.sources.vector.geojson import parse_geojson
 from semsig_gis.sources.vector.member import (
     CONTAINER,
     GEOJSON,
@@ -32,13 +34,16 @@ from semsig_gis.sources.vector.member import (
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
     from semsig_gis.sources.rows import Position
     from semsig_gis.sources.vector.member import Member
 
 GEOMETRY_TYPES = dict(enumerate(("Point", "LineString", "Polygon", "MultiPoint", "MultiLineString",
                         "MultiPolygon"), start=1))  # fmt: skip
 """Geometry types by their codes in well-known binary."""
-POINT = 1
+UNKNOWN = "Unknown"  # GDAL's geometry type of several types
 SHORTEST_RING = 4  # coordinates
 DIMENSION_BITS = 0xE0000000  # the flags of Z, M and SRID
 MOST_STEP_ROWS = 65_536
@@ -53,16 +58,20 @@ pyogrio.set_gdal_config_options({"OGR_FLATGEOBUF_STREAM_BASE_IMPL": True})
 
 @dataclass(frozen=True, slots=True)
 class LayerDescription:
-    """Description of a layer by GDAL: geometry type, fields, CRS (empty if none), rows, bounds.
+    """Description of a layer: geometry type, fields, CRS, number of rows and bounds.
 
-    `bounds` are west, south, east, north in the unit of the CRS, None without a geometry.
+    The `crs` is None if the file states none that is known; that of GeoJSON may be `implicit`.
+    `bounds` are west, south, east, north in the unit of the CRS. Of GeoJSON, `empty` are the
+    numbers of the rows without coordinates; geometry type and bounds may be unknown.
     """
 
     geometry: str
     fields: tuple[str, ...]
-    crs: str
+    crs: CRS | None
     rows: int
-    bounds: tuple[float, ...] | None
+    bounds: tuple[float, ...] | None = None
+    implicit: bool = False
+    empty: frozenset[int] = frozenset()
 
 
 _lock = threading.RLock()
@@ -84,12 +93,44 @@ def _captured_warnings(*, crs: bool = False) -> Iterator[list[warnings.WarningMe
             pyogrio.set_gdal_config_options({CRS_SEARCH: before})
 
 
-def describe(member: Member) -> LayerDescription:
-    """Describe a layer of a file; SourceError if it cannot be opened, or is of another kind."""
+def describe(member: Member, *, bounds: bool = False) -> LayerDescription:
+    """Describe a layer of a file; SourceError if it cannot be opened, or is of another kind.
+
+    For the `bounds` of GeoJSON, GDAL parses the file as well.
+    """
     member.require_sound()
+    geojson = parse_geojson(member) if member.driver == GEOJSON else None
+    if geojson is not None and geojson.fields is not None and not bounds:
+        return LayerDescription(
+            UNKNOWN, geojson.fields, geojson.crs, geojson.rows,
+            implicit=geojson.implicit, empty=geojson.empty,
+        )  # fmt: skip
+    info = _info(member)
+    if info["driver"] != member.driver:
+        raise not_of_its_kind(member)
+    text = info["crs"] or ""
+    crs = usable_crs(text)
+    # The search by GDAL finds the code of more systems.
+    if member.driver == SHAPEFILE and text and (crs is None or not crs.srs.startswith("EPSG:")):
+        crs = usable_crs(_info(member, crs=True)["crs"] or "")
+    return LayerDescription(
+        geometry=info["geometry_type"] or NO_GEOMETRY,
+        fields=tuple(info["fields"]),
+        crs=crs if geojson is None else geojson.crs,
+        rows=info["features"],
+        bounds=info["total_bounds"],
+        implicit=geojson is not None and geojson.implicit,
+        # Rows cannot be assigned if GDAL counts differently.
+        empty=geojson.empty
+        if geojson is not None and geojson.rows == info["features"]
+        else frozenset(range(1, info["features"] + 1)),
+    )
+
+
+def _info(member: Member, *, crs: bool = False) -> dict[str, Any]:
     try:
-        with _captured_warnings(crs=True):
-            info = pyogrio.read_info(
+        with _captured_warnings(crs=crs):
+            info: dict[str, Any] = pyogrio.read_info(
                 member.address,
                 layer=member.layer,
                 force_feature_count=True,
@@ -97,15 +138,7 @@ def describe(member: Member) -> LayerDescription:
             )
     except Exception as error:
         raise unreadable(member, error) from error
-    if info["driver"] != member.driver:
-        raise not_of_its_kind(member)
-    return LayerDescription(
-        geometry=info["geometry_type"] or NO_GEOMETRY,
-        fields=tuple(info["fields"]),
-        crs=info["crs"] or "",
-        rows=info["features"],
-        bounds=info["total_bounds"],
-    )
+    return info
 
 
 def layer_names(member: Member) -> list[str]:
@@ -127,24 +160,24 @@ def read_whole(member: Member, fields: Sequence[str], count: int) -> Rows | None
     GDAL returns a missing geometry also for a damaged one, without a distinction.
     """
     if count == 0:
-        return Rows()
+        return Rows.of(fields)
     try:
         with _captured_warnings() as captured:
-            names, values, shapes = _read(member, fields, 0, count)
-        positions = _positions(shapes)
+            table = _read(member, fields, 0, count)
+        geometry, nowhere = _geometries(table.column(-1).to_numpy())
     except Exception:  # noqa: BLE001 - any error; the rows are read one by one then
         return None
     # A warning, a missing geometry or a point of NaN may be damage.
-    if captured or (member.driver != GEOJSON and not all(shapes)):
+    if captured or (member.driver != GEOJSON and table.column(-1).null_count):
         return None
-    if member.driver != CONTAINER and any(map(_is_nowhere, positions)):
+    if member.driver != CONTAINER and nowhere:
         return None
     return Rows(
+        {field: table.column(field) for field in fields},
         read=count,
         numbers=list(range(1, count + 1)),
-        names=names,
-        values=values,
-        positions=[shapely.Point() if _is_nowhere(place) else place for place in positions],
+        names=list(map(str, table.column(0).to_pylist())),
+        positions=geometry.tolist(),
     )
 
 
@@ -153,7 +186,7 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
 
     Rows are read in blocks. A block that fails is divided until a single row fails.
     """
-    rows = Rows()
+    rows = Rows.of(fields)
     undecoded: list[str] = []
     null_rows: set[int] | None = None  # of a shapefile, which states them
     if member.driver == SHAPEFILE:
@@ -167,22 +200,26 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
         step = min(step, count - rows.read)
         try:
             with _captured_warnings():
-                names, values, shapes = _read(member, fields, rows.read, step, undecoded=undecoded)
+                table = _read(member, fields, rows.read, step, undecoded=undecoded)
         except Exception as error:  # noqa: BLE001 - any error; the other rows are read
             if step > 1:
                 step = max(1, step // 8)
                 continue
-            rows.read += 1
-            rows.errors[rows.read] = str(error).rstrip(".")
+            rows.skip(str(error).rstrip("."))
             failures += 1
             if failures == MOST_FAILURES:
                 rows.mark_unreadable(count, OUT_OF_REACH)
             continue
-        for name, row, shape in zip(names, values, shapes, strict=True):
-            rows.read += 1
-            place = _place(rows, shape, null=null_rows is None or rows.read in null_rows)
-            empty = member.driver == CONTAINER and _is_nowhere(place)
-            rows.add(row, name, shapely.Point() if empty else place)
+        for name, row, shape in zip(
+            table.column(0).to_pylist(),
+            table.select(list(fields)).to_pylist() if fields else itertools.repeat({}, step),
+            table.column(-1).to_pylist(),
+            strict=True,
+        ):
+            null = null_rows is None or rows.read + 1 in null_rows
+            rows.add(
+                row, str(name), _place(rows, shape, null=null, keep=member.driver != CONTAINER)
+            )
         # After a success, try larger blocks again.
         step, failures = min(8 * step, MOST_STEP_ROWS), 0
     return rows, (NOT_UTF8,) if undecoded else ()
@@ -192,11 +229,12 @@ def first_rows_of(member: Member, fields: Sequence[str], count: int) -> Iterator
     """Yield the values of the first readable rows of a layer."""
     try:
         with _captured_warnings():
-            values = _read(member, fields, 0, count)[1]
+            table = _read(member, fields, 0, count)
+        columns = {field: table.column(field).to_pylist() for field in fields}
     except Exception:  # noqa: BLE001 - any error; the readable rows are enough here
-        values = read_each(member, fields, count)[0].values
-    for value in values:
-        yield dict(zip(fields, value, strict=True))
+        columns = read_each(member, fields, count)[0].columns
+    for values in zip(*columns.values(), strict=True):
+        yield {field: plain(value) for field, value in zip(fields, values, strict=True)}
 
 
 def _read(
@@ -207,8 +245,8 @@ def _read(
     *,
     undecoded: list[str] | None = None,
     encoding: str | None = None,
-) -> tuple[list[str], list[Sequence[Any]], list[bytes]]:
-    """Return names, values and well-known binary of `size` rows; raise if a row cannot be read.
+) -> pa.Table:
+    """Return `size` rows: their numbers, the fields, and well-known binary; raise if one is bad.
 
     Text that is not UTF-8 raises; with a list `undecoded` it becomes None and its field is added to
     the list. A shapefile without a stated encoding is read as Latin-1 then, as fiona does.
@@ -218,34 +256,25 @@ def _read(
     with open_arrow(
         member.address, return_fids=True, batch_size=size, use_pyarrow=True, **options
     ) as (_, reader):
-        table: Any = next(reader, ())
-    if len(table) != size:  # Arrow stops without a message; the other reader raises the error
+        batch: Any = next(reader, ())
+    if len(batch) != size:  # Arrow stops without a message; the other reader raises the error
         read(member.address, max_features=size, **options)
         raise ValueError("cannot be read")
-    columns = []
-    for field in fields:
+    table = pa.Table.from_batches([batch])
+    for number, name in enumerate(table.column_names):
+        column = table.column(number)
         try:
-            column = table.column(field)
-            columns.append([_plain(value) for value in column.to_pylist()])
-        except (KeyError, UnicodeDecodeError) as error:
+            column.validate(full=True)
+        except pa.ArrowInvalid:
             info = {} if encoding else pyogrio.read_info(member.address, layer=member.layer)
             if info.get("encoding") == LATIN:
                 return _read(member, fields, start, size, encoding=LATIN)
-            if undecoded is None or isinstance(error, KeyError):
+            if undecoded is None:
                 raise
-            undecoded.append(field)
-            columns.append([_decoded(value) for value in column.cast("binary").to_pylist()])
-    names = [str(number) for number in table.column(0).to_pylist()]
-    rows: list[Sequence[Any]] = [*zip(*columns, strict=True)] if columns else [()] * size
-    # The last column is the geometry; in a table without geometry nobody uses it.
-    return names, rows, table.column(table.num_columns - 1).to_pylist()
-
-
-def _plain(value: object) -> object:
-    """Return dates and times as text in ISO 8601 without a time zone, others unchanged."""
-    if isinstance(value, dt.datetime):
-        return value.replace(tzinfo=None).isoformat()
-    return value.isoformat() if isinstance(value, dt.date | dt.time) else value
+            undecoded.append(name)
+            texts = [_decoded(value) for value in column.cast("binary").to_pylist()]
+            table = table.set_column(number, name, pa.array(texts, pa.string()))
+    return table
 
 
 def _decoded(value: bytes | None) -> str | None:
@@ -255,49 +284,39 @@ def _decoded(value: bytes | None) -> str | None:
         return None
 
 
-def _positions(shapes: Sequence[bytes]) -> list[Position]:
-    """Return the positions of well-known binary; GEOSException if a geometry is not valid."""
-    positions: list[Position] = [_point(shape) for shape in shapes]
-    others = [row for row, shape in enumerate(shapes) if shape and positions[row] is None]
-    with np.errstate(invalid="ignore"):  # NaN is checked later for all geometries at once
-        built = shapely.force_2d(shapely.from_wkb([shapes[row] for row in others]))
-    for row, geometry in zip(others, built, strict=True):
-        positions[row] = geometry
-    return positions
+def _geometries(shapes: Sequence[bytes]) -> tuple[NDArray[np.object_], list[int]]:
+    """Return the geometries of well-known binary, and the rows of points with two NaN.
 
-
-def _point(shape: bytes) -> Position:
-    """Return the coordinates of a point, else None.
-
-    Shapely is not used, because it returns a point with x = NaN as empty.
+    A point with two NaN becomes empty. GEOSException if a geometry is not valid.
     """
-    if not shape or _kind(shape) != POINT:
-        return None
-    x, y = struct.unpack_from("<2d" if shape[0] else ">2d", shape, 5)
-    return x, y
+    with np.errstate(invalid="ignore"):  # NaN is checked later for all geometries at once
+        built = shapely.force_2d(np.array(shapely.from_wkb(shapes), dtype=object))
+    nowhere = []
+    # Shapely returns a point with x = NaN as empty.
+    is_point = shapely.get_type_id(built) == shapely.GeometryType.POINT
+    for row in np.flatnonzero(is_point & shapely.is_empty(built)).tolist():
+        x, y = struct.unpack_from("<2d" if shapes[row][0] else ">2d", shapes[row], 5)
+        built[row] = shapely.points(x, y)
+        if math.isnan(x) and math.isnan(y):
+            built[row] = shapely.Point()
+            nowhere.append(row)
+    return built, nowhere
 
 
-def _is_nowhere(position: Position | str) -> bool:
-    """Whether a point has NaN coordinates: in a GeoPackage it is empty, else damaged."""
-    return isinstance(position, tuple) and math.isnan(position[0]) and math.isnan(position[1])
-
-
-def _kind(shape: bytes) -> int:
-    (code,) = struct.unpack_from("<I" if shape[0] else ">I", shape, 1)
-    return int(code & ~DIMENSION_BITS) % 1000
-
-
-def _place(rows: Rows, shape: bytes, *, null: bool) -> Position | str:
-    """Return the position of a row, or the text of its error."""
+def _place(rows: Rows, shape: bytes, *, null: bool, keep: bool) -> Position | str:
+    """Return the position of a row, or the text of its error; with `keep`, a point may be NaN."""
     if not shape:
         return None if null else "its geometry is damaged"
     try:
-        return _positions([shape])[0]
+        (geometry,), nowhere = _geometries([shape])
     except shapely.errors.GEOSException as error:
         with np.errstate(invalid="ignore"):
             closed = shapely.from_wkb(shape, on_invalid="fix")
         rings = shapely.get_rings(shapely.get_parts(closed))
         if not len(rings) or (shapely.get_num_coordinates(rings) < SHORTEST_RING).any():
-            return f"its {GEOMETRY_TYPES.get(_kind(shape), 'geometry')} is not valid ({error})"
+            (code,) = struct.unpack_from("<I" if shape[0] else ">I", shape, 1)
+            kind = GEOMETRY_TYPES.get(int(code & ~DIMENSION_BITS) % 1000, "geometry")
+            return f"its {kind} is not valid ({error})"
         rows.closed += 1
         return shapely.force_2d(closed)
+    return (math.nan, math.nan) if nowhere and keep else geometry
