@@ -263,7 +263,8 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
     """
     rows = np.arange(len(objects)) if keep_order else hilbert_order(shapely.points(objects.xy))
     xy = objects.xy[rows]
-    arrow = objects.arrow.take(pa.array(rows))
+    stored = [name for name in objects.arrow.column_names if name in {*COLUMNS, GEOMETRY}]
+    arrow = objects.arrow.select(stored).take(pa.array(rows))
     arrow = arrow.append_column(BBOX, bounds_column(np.column_stack([xy, xy])))
     bounds = (*objects.xy.min(axis=0), *objects.xy.max(axis=0))
     geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=bounds)

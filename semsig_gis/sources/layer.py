@@ -117,6 +117,7 @@ class RawLayer(Displayed):
             plain = table.drop(columns=table.geometry.name)
             columns = pa.Table.from_pandas(plain, preserve_index=False).replace_schema_metadata()
             geometry, crs = table.geometry.to_numpy(), table.crs
+            vars(self)["table"] = table
         vars(self).update(spec=spec, counts=counts, columns=columns, geometry=geometry, crs=crs,
                           errors=errors, notes=notes, extent=extent)  # fmt: skip
 

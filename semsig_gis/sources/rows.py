@@ -393,10 +393,10 @@ class _CodedColumn:
     What a rule says about a value is computed once for each distinct value.
     """
 
-    def __init__(self, values: Sequence[Any] | pa.ChunkedArray) -> None:
-        if isinstance(values, pa.ChunkedArray):
+    def __init__(self, values: Sequence[Any] | pa.Array) -> None:
+        if isinstance(values, pa.Array):
             try:
-                coded = values.combine_chunks().dictionary_encode("encode")
+                coded = values.dictionary_encode("encode")
             except pa.ArrowNotImplementedError:  # lists and structures
                 values = values.to_pylist()
             else:

@@ -19,6 +19,7 @@ from sentences import refused
 
 from semsig_gis.core import CrsError, InputError, SemsigError
 from semsig_gis.sources import (
+    RawLayer,
     RowCounts,
     clip_layer,
     clip_layers,
@@ -31,7 +32,6 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.sources import RawLayer
 
 BOX = (3.8, 43.5, 3.9, 43.7)
 

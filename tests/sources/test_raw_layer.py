@@ -74,7 +74,7 @@ def apply(spec: LayerSpec, **columns: Sequence[object]) -> FilteredRows:
     return rules.apply(rows)
 
 
-def column(name: str, spec: LayerSpec, **columns: Sequence[object]) -> list[Any]:
+def column(name: str, spec: LayerSpec, /, **columns: Sequence[object]) -> list[Any]:
     values: list[Any] = apply(spec, **columns).columns[name].to_pylist()
     return values
 

@@ -264,7 +264,7 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
     ):
         columns = {
             name: [plain(value) for value in column.to_pylist()]
-            if isinstance(column, pa.ChunkedArray)
+            if isinstance(column, pa.Array)
             else column
             for name, column in rows.columns.items()
         }

@@ -7,7 +7,7 @@ It is calibrated: the signature database of `PARIS_LIKE` (30 m, cells of 10 m, v
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyproj
 import shapely
 
-from semsig_gis.core import CLASS_NAME, HALF_WIDTH, MOST_SEED, SOURCE_ID, InputError, require_number
+from semsig_gis.core import CLASS_NAME, MOST_SEED, SOURCE_ID, InputError, require_number
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.layer import RawLayer, RowCounts
 from semsig_gis.sources.layer_spec import LayerSpec
@@ -229,9 +229,9 @@ def _streets(spec: CitySpec, network: Network) -> RawLayer:
     lines = shapely.clip_by_rect(network.lines, *_square(spec))
     edges = np.flatnonzero(~shapely.is_empty(lines))
     numbers = [str(number) for number in edges]
-    half_width = pa.array(network.half_width[edges])
     streets = _layer(spec, "streets", _placed(spec, lines[edges]), numbers)
-    return replace(streets, columns=streets.columns.append_column(HALF_WIDTH, half_width))
+    table = streets.table.assign(half_width=network.half_width[edges])
+    return RawLayer(spec=streets.spec, counts=streets.counts, table=table)
 
 
 def _square(spec: CitySpec) -> Bounds:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import math
 import struct
 import threading
@@ -163,20 +162,20 @@ def read_whole(member: Member, fields: Sequence[str], count: int) -> Rows | None
         return Rows.of(fields)
     try:
         with _captured_warnings() as captured:
-            table = _read(member, fields, 0, count)
-        geometry, nowhere = _geometries(table.column(-1).to_numpy())
+            names, columns, shapes = _read(member, fields, 0, count)
+        geometry, nowhere = _geometries(shapes.to_numpy(zero_copy_only=False))
     except Exception:  # noqa: BLE001 - any error; the rows are read one by one then
         return None
     # A warning, a missing geometry or a point of NaN may be damage.
-    if captured or (member.driver != GEOJSON and table.column(-1).null_count):
+    if captured or (member.driver != GEOJSON and shapes.null_count):
         return None
     if member.driver != CONTAINER and nowhere:
         return None
     return Rows(
-        {field: table.column(field) for field in fields},
+        columns,
         read=count,
         numbers=list(range(1, count + 1)),
-        names=list(map(str, table.column(0).to_pylist())),
+        names=names,
         positions=geometry.tolist(),
     )
 
@@ -200,7 +199,7 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
         step = min(step, count - rows.read)
         try:
             with _captured_warnings():
-                table = _read(member, fields, rows.read, step, undecoded=undecoded)
+                names, columns, shapes = _read(member, fields, rows.read, step, undecoded=undecoded)
         except Exception as error:  # noqa: BLE001 - any error; the other rows are read
             if step > 1:
                 step = max(1, step // 8)
@@ -210,16 +209,12 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
             if failures == MOST_FAILURES:
                 rows.mark_unreadable(count, OUT_OF_REACH)
             continue
-        for name, row, shape in zip(
-            table.column(0).to_pylist(),
-            table.select(list(fields)).to_pylist() if fields else itertools.repeat({}, step),
-            table.column(-1).to_pylist(),
-            strict=True,
-        ):
+        lists = {field: column.to_pylist() for field, column in columns.items()}
+        for row, (name, shape) in enumerate(zip(names, shapes.to_pylist(), strict=True)):
+            values = {field: column[row] for field, column in lists.items()}
             null = null_rows is None or rows.read + 1 in null_rows
-            rows.add(
-                row, str(name), _place(rows, shape, null=null, keep=member.driver != CONTAINER)
-            )
+            place = _place(rows, shape, null=null, keep=member.driver != CONTAINER)
+            rows.add(values, name, place)
         # After a success, try larger blocks again.
         step, failures = min(8 * step, MOST_STEP_ROWS), 0
     return rows, (NOT_UTF8,) if undecoded else ()
@@ -229,8 +224,8 @@ def first_rows_of(member: Member, fields: Sequence[str], count: int) -> Iterator
     """Yield the values of the first readable rows of a layer."""
     try:
         with _captured_warnings():
-            table = _read(member, fields, 0, count)
-        columns = {field: table.column(field).to_pylist() for field in fields}
+            arrays = _read(member, fields, 0, count)[1]
+        columns = {field: column.to_pylist() for field, column in arrays.items()}
     except Exception:  # noqa: BLE001 - any error; the readable rows are enough here
         columns = read_each(member, fields, count)[0].columns
     for values in zip(*columns.values(), strict=True):
@@ -245,36 +240,37 @@ def _read(
     *,
     undecoded: list[str] | None = None,
     encoding: str | None = None,
-) -> pa.Table:
-    """Return `size` rows: their numbers, the fields, and well-known binary; raise if one is bad.
+) -> tuple[list[str], dict[str, pa.Array], pa.Array]:
+    """Return names, values and well-known binary of `size` rows; raise if a row cannot be read.
 
     Text that is not UTF-8 raises; with a list `undecoded` it becomes None and its field is added to
-    the list. A shapefile without a stated encoding is read as Latin-1 then, as fiona does.
+    the list. A shapefile without a stated encoding is read as Latin-1, as fiona does.
     """
     options: dict[str, Any] = {"layer": member.layer, "columns": list(fields), "encoding": encoding}
     options |= {"skip_features": start}
     with open_arrow(
         member.address, return_fids=True, batch_size=size, use_pyarrow=True, **options
-    ) as (_, reader):
-        batch: Any = next(reader, ())
+    ) as (meta, reader):
+        batch: Any = next(reader, ()) if encoding or meta["encoding"] != LATIN else None
+    if batch is None:
+        return _read(member, fields, start, size, undecoded=undecoded, encoding=LATIN)
     if len(batch) != size:  # Arrow stops without a message; the other reader raises the error
         read(member.address, max_features=size, **options)
         raise ValueError("cannot be read")
-    table = pa.Table.from_batches([batch])
-    for number, name in enumerate(table.column_names):
-        column = table.column(number)
+    # By number, because the column of row numbers, the first one, may have the name of a field. The
+    # last one is the geometry; in a table without geometry nobody uses it.
+    found = dict(zip(meta["fields"].tolist(), batch.columns[1:], strict=False))
+    columns = {field: found[field] for field in fields}
+    for field, column in columns.items():
         try:
             column.validate(full=True)
         except pa.ArrowInvalid:
-            info = {} if encoding else pyogrio.read_info(member.address, layer=member.layer)
-            if info.get("encoding") == LATIN:
-                return _read(member, fields, start, size, encoding=LATIN)
             if undecoded is None:
                 raise
-            undecoded.append(name)
+            undecoded.append(field)
             texts = [_decoded(value) for value in column.cast("binary").to_pylist()]
-            table = table.set_column(number, name, pa.array(texts, pa.string()))
-    return table
+            columns[field] = pa.array(texts, pa.string())
+    return list(map(str, batch.column(0).to_pylist())), columns, batch.columns[-1]
 
 
 def _decoded(value: bytes | None) -> str | None:
