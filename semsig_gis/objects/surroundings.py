@@ -23,7 +23,6 @@ from semsig_gis.sources import (
     join_areas,
     load_catalog,
     parse_area,
-    read_layer,
     read_parquet,
     reader,
     transformed,
@@ -224,7 +223,7 @@ def _read_file(
         return _with_licences(layer), layer.notes
     if path.suffix.lower() in SUFFIXES:
         return read_parquet(path, kind=f"{kind}s", box=box), ()
-    layer = read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
+    (layer,) = reader("vector_file")(path, [LayerSpec(name=role, class_name="", geometry=kind)])
     if layer.errors:
         raise SourceError(
             f"{path} has {layer.counts.unreadable} features that cannot be read "

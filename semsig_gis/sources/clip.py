@@ -12,12 +12,12 @@ import numpy as np
 import shapely
 
 from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, InputError
+from semsig_gis.sources import vector
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.layer import transformed
 from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.paths import FILE_SUFFIXES
 from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
-from semsig_gis.sources.vector import file as vector_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,7 +47,7 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
     if not NUMBERS.fullmatch(text):
         path = Path(text)
         polygons = LayerSpec(name="area", class_name="", geometry="polygon")
-        layer = vector_file.read_layer(path, polygons)
+        layer = vector.read_layer(path, polygons)
         if layer.errors:
             raise InputError(
                 f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."

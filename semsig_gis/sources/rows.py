@@ -412,8 +412,8 @@ class _CodedColumn:
 
     def map(self, rule: Callable[[Any], Any], kind: type) -> NDArray[Any]:
         """Return the result of a rule for the value of every row, as an array of this type."""
-        results: NDArray[Any] = np.array([rule(value) for value in self.values], kind)
-        return results[self.codes]
+        results: NDArray[Any] = np.array([rule(v) for v in self.values], kind)[self.codes]
+        return results
 
     def texts(self, rule: Callable[[Any], str | None]) -> pa.Array:
         """Return the text that a rule gives for the value of every row, as an Arrow column."""

@@ -19,7 +19,7 @@ import pyarrow as pa
 import shapely
 
 from semsig_gis.core import CrsError, InputError
-from semsig_gis.sources import parquet
+from semsig_gis.sources import parquet, vector
 from semsig_gis.sources.catalog import data_folder, load_catalog
 from semsig_gis.sources.filters import as_text
 from semsig_gis.sources.layer import transformed
@@ -33,7 +33,6 @@ from semsig_gis.sources.osm.elements import (
 from semsig_gis.sources.parquet import read_parquet
 from semsig_gis.sources.probe import probe_file
 from semsig_gis.sources.rows import WGS84, BadFeatureError, built_geometries, parse_crs, plain
-from semsig_gis.sources.vector.file import read_tables, spatial_layers
 from semsig_gis.storage import parse_toml
 
 if TYPE_CHECKING:
@@ -258,8 +257,8 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
         yield _frame_table(frame)
         return
     # A file that the probe does not open as a vector file is refused here with its error.
-    layers = probe_file(path).layers or spatial_layers(path)
-    for rows, system, crs_notes in read_tables(
+    layers = probe_file(path).layers or vector.spatial_layers(path)
+    for rows, system, crs_notes in vector.read_tables(
         layers, lambda fields: names_read if has_tag_columns(fields) else (), crs=crs
     ):
         columns = {
