@@ -73,7 +73,7 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
     ...     len(read_surroundings(file, role="buildings", crs="EPSG:2154", box=(0, 0, 9, 9)))
     1
     """
-    ordered = table.iloc[hilbert_order(table.geometry.array)]
+    ordered = table.iloc[hilbert_order(table.bounds.to_numpy())]
     with whole_file(path) as partial:
         ordered.to_parquet(
             partial,

@@ -261,13 +261,13 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
     ...     len(open_objects(f"{folder}/objects.parquet")) == len(demo_objects)
     True
     """
-    rows = np.arange(len(objects)) if keep_order else hilbert_order(shapely.points(objects.xy))
-    xy = objects.xy[rows]
+    bounds = np.column_stack([objects.xy, objects.xy])
+    rows = np.arange(len(objects)) if keep_order else hilbert_order(bounds)
     stored = [name for name in objects.arrow.column_names if name in {*COLUMNS, GEOMETRY}]
     arrow = objects.arrow.select(stored).take(pa.array(rows))
-    arrow = arrow.append_column(BBOX, bounds_column(np.column_stack([xy, xy])))
-    bounds = (*objects.xy.min(axis=0), *objects.xy.max(axis=0))
-    geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=bounds)
+    arrow = arrow.append_column(BBOX, bounds_column(bounds[rows]))
+    box = (*objects.xy.min(axis=0), *objects.xy.max(axis=0))
+    geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=box)
     geo["columns"]["geometry"]["covering"] = COVERING
     write_geoparquet(arrow, path, geo=geo, group_rows=GROUP_ROWS, specs=objects_specs(objects))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import datetime as dt
 import functools
@@ -181,12 +182,23 @@ class Rows:
 
     def add(self, values: Mapping[str, Any], name: str, position: Position | str) -> None:
         """Add the next row; a field without a value is missing."""
+        row = len(self.numbers)
         self.read += 1
         self.numbers.append(self.read)
         self.names.append(name)
         self.positions.append(position)
-        for field, column in self.columns.items():
-            column.append(values.get(field))
+        # A column ends at its last value: most elements of OpenStreetMap have few of the tags.
+        for field in self.columns.keys() & values.keys():
+            column = self.columns[field]
+            column += [None] * (row - len(column))
+            column.append(values[field])
+
+    def column(self, field: str) -> Sequence[Any] | pa.Array:
+        """Return the value of every row in a field, None where it is missing."""
+        column = self.columns[field]
+        if isinstance(column, list):
+            column += [None] * (len(self.numbers) - len(column))
+        return column
 
     def skip(self, error: str | None = None) -> None:
         """Count the next row as filtered, or with an error as unreadable."""
@@ -394,6 +406,9 @@ class _CodedColumn:
     """
 
     def __init__(self, values: Sequence[Any] | pa.Array) -> None:
+        if not isinstance(values, pa.Array):
+            with contextlib.suppress(pa.ArrowInvalid, pa.ArrowTypeError, UnicodeError):
+                values = pa.array(values, pa.string())
         if isinstance(values, pa.Array):
             try:
                 coded = values.dictionary_encode("encode")
@@ -478,7 +493,7 @@ class RowRules:
         id of another row.
         """
         spec, size = self.spec, len(rows.numbers)
-        columns = {field: _CodedColumn(rows.columns[field]) for field in self.fields}
+        columns = {field: _CodedColumn(rows.column(field)) for field in self.fields}
         passed = np.ones(size, bool)
         for field, condition in self._where:
             passed &= columns[field].map(condition.accepts, bool)

@@ -261,11 +261,10 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
     for rows, system, crs_notes in vector.read_tables(
         layers, lambda fields: names_read if has_tag_columns(fields) else (), crs=crs
     ):
+        arrays = {name: rows.column(name) for name in rows.columns}
         columns = {
-            name: [plain(value) for value in column.to_pylist()]
-            if isinstance(column, pa.Array)
-            else column
-            for name, column in rows.columns.items()
+            name: [plain(v) for v in array.to_pylist()] if isinstance(array, pa.Array) else array
+            for name, array in arrays.items()
         }
         positions = rows.positions
         if not system.equals(WGS84, ignore_axis_order=True):

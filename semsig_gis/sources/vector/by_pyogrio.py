@@ -227,7 +227,8 @@ def first_rows_of(member: Member, fields: Sequence[str], count: int) -> Iterator
             arrays = _read(member, fields, 0, count)[1]
         columns = {field: column.to_pylist() for field, column in arrays.items()}
     except Exception:  # noqa: BLE001 - any error; the readable rows are enough here
-        columns = read_each(member, fields, count)[0].columns
+        rows = read_each(member, fields, count)[0]
+        columns = {field: rows.column(field) for field in fields}
     for values in zip(*columns.values(), strict=True):
         yield {field: plain(value) for field, value in zip(fields, values, strict=True)}
 
