@@ -102,7 +102,7 @@ def fetch_layers(
         )
         for layer in service.read_layers(tiles, specs, filters=filters):
             layers.append(clip_layer(layer, area))
-            tell(f"{layer.spec.name}: {len(layers[-1].table):,} rows; {layer.spec.terms}")
+            tell(f"{layer.spec.name}: {len(layers[-1]):,} rows; {layer.spec.terms}")
         return tuple(layers)
     for download in services.fetch_layers(
         catalog.reader,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -23,7 +24,7 @@ from semsig_gis.sources.http.cache import cache_key, checksum
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, cached_file
 from semsig_gis.sources.osm.elements import TagIndex, element_layers
 from semsig_gis.sources.rows import WGS84
-from semsig_gis.storage import groups_meeting, parse_json
+from semsig_gis.storage import groups_meeting, parse_json, rows_meeting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     Boxes = Sequence[tuple[float, float, float, float]]
 
 GEOMETRY, BOX, SOURCE_TAGS = "geometry", "bbox", "source_tags"
-SIDES = ("xmin", "ymin", "xmax", "ymax")
 # Part of a path, such as theme=base.
 PARTITION = re.compile(r"(theme|type)=([^/\\]+)")
 # Kinds of OpenStreetMap elements by their type of geometry in Overture.
@@ -50,6 +50,7 @@ KIND_BY_GEOMETRY: dict[str, ElementKind] = {
     "Polygon": "way",
     "MultiPolygon": "relation",
 }
+EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 ROUNDING_DEG = 2e-5  # error of the largest degrees as 32-bit floats
 THREADS = 8  # more than processors, because they mostly wait for the store
 STORE = "s3"
@@ -114,10 +115,10 @@ def _add_rows(table: pa.Table, layers: Sequence[LayerBuilder]) -> None:
 # --- The needed parts of a file -------------------------------------------------------------------
 
 
-def _boxes(area: Area | None) -> Boxes | None:
+def _boxes(area: Area | None) -> Boxes:
     """Return the boxes of an area, a little larger, because the boxes in a file are rounded."""
     if area is None:
-        return None
+        return [EVERYWHERE]
     return [
         (west - ROUNDING_DEG, south - ROUNDING_DEG, east + ROUNDING_DEG, north + ROUNDING_DEG)
         for west, south, east, north in area.boxes
@@ -125,7 +126,7 @@ def _boxes(area: Area | None) -> Boxes | None:
 
 
 def _slices(
-    system: fs.FileSystem, path: str, specs: Sequence[LayerSpec], boxes: Boxes | None
+    system: fs.FileSystem, path: str, specs: Sequence[LayerSpec], boxes: Boxes
 ) -> Iterator[pa.Table]:
     """Yield the rows of a file that may be in the layers and boxes, with the needed columns.
 
@@ -134,12 +135,9 @@ def _slices(
     try:
         with system.open_input_file(path) as stream, pq.ParquetFile(stream) as file:
             columns = _columns(file.schema_arrow, specs, where=path)
-            groups = set(range(file.num_row_groups))
-            if boxes is not None:
-                groups = {group for box in boxes for group in groups_meeting(file, box)}
-            for number in sorted(groups):
-                table = file.read_row_group(number, columns=columns).flatten()
-                yield table.filter(pa.array(_may_match(table, specs, boxes)))
+            for number in groups_meeting(file, *boxes):
+                table = rows_meeting(file.read_row_group(number, columns=columns), *boxes).flatten()
+                yield table.filter(pa.array(_may_match(table, specs)))
     except (OSError, pa.ArrowException) as error:
         raise SourceError(
             f"{path} cannot be read as GeoParquet ({_cause(error)}); download it again."
@@ -161,19 +159,8 @@ def _columns(schema: pa.Schema, specs: Iterable[LayerSpec], *, where: str) -> li
     return sorted({"id", GEOMETRY, *key_columns} | (optional & {*schema.names}))
 
 
-def _may_match(
-    table: pa.Table, specs: Iterable[LayerSpec], boxes: Boxes | None
-) -> NDArray[np.bool_]:
-    """Return the mask of the rows that meet a box and may be in a layer.
-
-    All rows of a table without bounds meet a box; tags in `source_tags` are not checked.
-    """
-    inside = np.ones(len(table), bool)
-    if boxes is not None and {f"{BOX}.{side}" for side in SIDES} <= {*table.column_names}:
-        xmin, ymin, xmax, ymax = (table.column(f"{BOX}.{side}").to_numpy() for side in SIDES)
-        inside[:] = False
-        for west, south, east, north in boxes:
-            inside |= (xmin <= east) & (xmax >= west) & (ymin <= north) & (ymax >= south)
+def _may_match(table: pa.Table, specs: Iterable[LayerSpec]) -> NDArray[np.bool_]:
+    """Return the mask of the rows that may be in a layer; tags in `source_tags` are not checked."""
     tagged = np.zeros(len(table), bool)
     for tags in itertools.chain.from_iterable(spec.tags for spec in specs):
         # A row matches one of the alternatives in all its keys.
@@ -188,7 +175,7 @@ def _may_match(
                 )
                 rows &= is_in.to_numpy()
         tagged |= rows
-    return inside & tagged
+    return tagged
 
 
 def _cause(error: BaseException) -> str:

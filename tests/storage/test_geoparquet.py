@@ -213,6 +213,9 @@ def test_row_groups_and_rows_are_selected_by_box(tmp_path: Path) -> None:
         assert groups_meeting(file, (25, 1, 29, 2)) == []
         assert groups_meeting(file, (31, 5, 32, 9)) == []
     assert rows_meeting(table, (24, 4, 30, 9))["row"].to_pylist() == [2, 3]
+    assert rows_meeting(table, (24, 4, 25, 9), (101, 1, 102, 2))["row"].to_pylist() == [2, 10]
+    unknown = pa.table({"bbox": pa.array([None], table["bbox"].type), "row": [12]})
+    assert rows_meeting(unknown, (24, 4, 30, 9)).num_rows == 1
     assert np.concatenate(list(bounds_by_group(tmp_path / "a.parquet"))).tolist() == places.tolist()
 
 
