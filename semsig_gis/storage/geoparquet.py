@@ -118,7 +118,7 @@ def rows_meeting(table: pa.Table, *boxes: Sequence[float]) -> pa.Table:
 
 
 def _meeting(sides: Sequence[Any], boxes: Iterable[Sequence[float]]) -> Any:  # noqa: ANN401
-    """Whether bounds, as numbers or arrays in the order of `SIDES`, may intersect one of some boxes.
+    """Whether bounds, numbers or arrays in the order of `SIDES`, may intersect one of some boxes.
 
     Unknown bounds, which are NaN, may.
     """
