@@ -275,9 +275,9 @@ def _at_points(
     same = (group[area] == group[point]).all(axis=1)
     order = np.lexsort((point[same], area[same]))
     area, first = np.unique(area[same][order], return_index=True)
-    moved = xy.copy()
-    moved[area] = xy[point[same][order][first]]
-    return moved
+    places = xy.copy()
+    places[area] = xy[point[same][order][first]]
+    return places
 
 
 def _first_at_place(

@@ -161,10 +161,7 @@ def transformed(geometry: NDArray[np.object_], old: CRS, new: CRS) -> NDArray[np
     """Return geometries in another CRS, without a third dimension."""
     if old.is_exact_same(new):
         return geometry
-    moved: NDArray[np.object_] = shapely.transform(
-        geometry, lambda xy: transform_points(xy, old, new)
-    )
-    return moved
+    return np.asarray(shapely.transform(geometry, lambda xy: transform_points(xy, old, new)))
 
 
 def transform_points(xy: NDArray[np.float64], old: CRS, new: CRS) -> NDArray[np.float64]:

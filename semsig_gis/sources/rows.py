@@ -215,7 +215,7 @@ class Rows:
 
 
 class LayerBuilder:
-    """A layer while its rows are read: its rules, and its rows so far."""
+    """A layer while its rows are read: its rules and the rows."""
 
     def __init__(
         self, spec: LayerSpec, fields: Sequence[str], *, filters: bool, where: str

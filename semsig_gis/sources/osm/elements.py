@@ -176,7 +176,7 @@ class TagIndex:
 
 
 def element_layers(specs: Sequence[LayerSpec], *, filters: bool, where: str) -> list[LayerBuilder]:
-    """Return a builder for each layer, whose fields are keys of tags."""
+    """Return a builder for each layer; its fields are keys of tags."""
     return [
         LayerBuilder(
             spec,

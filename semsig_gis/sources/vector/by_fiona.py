@@ -1,6 +1,6 @@
 """Read a vector file row by row with fiona, and report the error of each bad row.
 
-pyogrio reads whole layers; fiona reads those of which a row may be damaged.
+pyogrio reads whole layers; fiona reads a layer again if a row may be damaged.
 """
 
 from __future__ import annotations

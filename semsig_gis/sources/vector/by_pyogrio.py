@@ -260,8 +260,8 @@ def _read(
         raise ValueError("cannot be read")
     # By number, because the column of row numbers, the first one, may have the name of a field. The
     # last one is the geometry; in a table without geometry nobody uses it.
-    found = dict(zip(meta["fields"].tolist(), batch.columns[1:], strict=False))
-    columns = {field: found[field] for field in fields}
+    arrays = dict(zip(meta["fields"].tolist(), batch.columns[1:], strict=False))
+    columns = {field: arrays[field] for field in fields}
     for field, column in columns.items():
         try:
             column.validate(full=True)
