@@ -6,22 +6,21 @@ collapsed duplicates within a source.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
 
 from semsig_gis.core import (
     COUNT,
-    GEOMETRY,
     MERGED,
     SOURCE,
     SOURCE_ID,
     Displayed,
     InputError,
-    ObjectIndex,
 )
+from semsig_gis.objects.table import arrow_objects
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -109,8 +108,7 @@ def conflate(
     >>> report.count == len(twice) - len(merged) > 100
     True
     """
-    table = objects.table
-    if MERGED in table.columns:
+    if MERGED in objects.arrow.column_names:
         raise InputError(
             "the objects are conflated already; conflate all sources at once, before saving."
         )
@@ -148,15 +146,14 @@ class _Match(NamedTuple):
 
 
 def _merge_keys(objects: StreetObjects) -> _MergeKeys:
-    table = objects.table
-    source, names = pd.factorize(table[SOURCE])
+    table = objects.arrow
+    source = table[SOURCE].combine_chunks().dictionary_encode()
+    codes = source.indices.to_numpy().astype(np.int64)
+    ids = np.unique(np.array(table[SOURCE_ID].to_pylist(), object), return_inverse=True)[1]
     x, y = objects.xy.T
-    keys = pd.DataFrame(
-        {"source": source, "x": x, "y": y, "id": table[SOURCE_ID], "count": table[COUNT]}
-    )
-    rank = np.empty(len(keys), np.int64)
-    rank[keys.sort_values(list(keys.columns)).index] = np.arange(len(keys))
-    return _MergeKeys(objects.xy, source, names.tolist(), rank)
+    rank = np.empty(len(codes), np.int64)
+    rank[np.lexsort([table[COUNT].to_numpy(), ids, y, x, codes])] = np.arange(len(codes))
+    return _MergeKeys(objects.xy, codes, source.dictionary.to_pylist(), rank)
 
 
 def _matches(
@@ -177,6 +174,8 @@ def _nearest_first(
     keys: _MergeKeys, old: NDArray[np.int64], new: NDArray[np.int64], radius: float
 ) -> list[tuple[int, int, float]]:
     """Match old and new rows one to one, the nearest pairs first."""
+    from semsig_gis.core import ObjectIndex  # noqa: PLC0415 - 0.1 s
+
     new_at, old_at = ObjectIndex(keys.xy[old]).pairs_within(keys.xy[new], radius=radius)
     new_row, old_row = new[new_at], old[old_at]
     metres = np.hypot(*(keys.xy[old_row] - keys.xy[new_row]).T)
@@ -194,20 +193,28 @@ def _nearest_first(
 
 def _merged(objects: StreetObjects, keys: _MergeKeys, matches: Sequence[_Match]) -> StreetObjects:
     """Return the remaining objects with their new counts and lists of merged objects."""
-    table = objects.table
-    source, source_id = table[SOURCE].tolist(), table[SOURCE_ID].tolist()
-    counts = table[COUNT].to_numpy(np.int64).copy()
+    table = objects.arrow
+    source, source_id = table[SOURCE].to_pylist(), table[SOURCE_ID].to_pylist()
+    counts = table[COUNT].to_numpy().astype(np.int64)
     entries: dict[int, list[str]] = {}
     for match in sorted(matches, key=lambda match: keys.rank[match.second]):  # by source
         counts[match.first] += counts[match.second]
         entry = f"{source[match.second]}:{source_id[match.second]}"
         entries.setdefault(match.first, []).append(entry)
-    result = table.drop(columns=GEOMETRY)
-    result[COUNT] = counts.astype(np.int32)
-    result[MERGED] = ["; ".join(entries.get(row, [])) for row in range(len(table))]
-    result = result.set_geometry(table.geometry)
-    merged_rows = [match.second for match in matches]
-    return replace(objects, table=result.drop(index=merged_rows).reset_index(drop=True))
+    merged = pa.array(["; ".join(entries.get(row, [])) for row in range(len(table))], pa.string())
+    number = table.column_names.index(COUNT)
+    table = table.set_column(number, COUNT, pa.array(counts.astype(np.int32)))
+    table = table.add_column(number + 1, MERGED, merged)
+    remains = np.ones(len(table), bool)
+    remains[[match.second for match in matches]] = False
+    return arrow_objects(
+        table.filter(pa.array(remains)),
+        xy=objects.xy[remains],
+        crs=objects.crs,
+        taxonomy=objects.taxonomy,
+        licenses=objects.licenses,
+        notes=objects.notes,
+    )
 
 
 def _report(

@@ -12,9 +12,8 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import shapely
-from pyproj import CRS, Transformer
+from pyproj import CRS
 
 from semsig_gis.core import (
     FULL_TURN,
@@ -30,7 +29,7 @@ from semsig_gis.core import (
     split_ids,
     wrap_degrees,
 )
-from semsig_gis.sources import LATITUDE_LIMIT, WGS84, fits_the_globe
+from semsig_gis.sources import LATITUDE_LIMIT, WGS84, fits_the_globe, transform_points
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,7 +80,7 @@ class _LocatedLayer:
     @cached_property
     def swapped(self) -> tuple[float, float] | None:
         """Centre of the layer if x and y are exchanged; None if that is not on the Earth."""
-        places = _distinct(_to_degrees(self.coordinates[:, ::-1], self.layer.table.crs))
+        places = _distinct(_to_degrees(self.coordinates[:, ::-1], self.layer.known_crs))
         return _Towns(places).centre() if len(places) else None
 
 
@@ -219,25 +218,18 @@ def settle_extent(
 
 
 def _located(layer: RawLayer) -> _LocatedLayer:
-    crs = layer.table.crs
-    if crs is None:
-        raise CrsError(
-            f"layer {layer.spec.name!r} has no coordinate reference system; "
-            "state its crs in the catalogue."
-        )
-    geometry = layer.table.geometry.to_numpy()
-    coordinates, row = shapely.get_coordinates(geometry, return_index=True)
+    crs = layer.known_crs
+    coordinates, row = shapely.get_coordinates(layer.geometry, return_index=True)
     first = np.flatnonzero(np.diff(row, prepend=-1))
     first = first[(np.abs(coordinates[first]) < BEYOND_EARTH_M).all(axis=1)]  # false for NaN too
-    degrees = np.full((len(geometry), 2), np.nan)
+    degrees = np.full((len(layer), 2), np.nan)
     degrees[row[first]] = _to_degrees(coordinates[first], crs)
     return _LocatedLayer(layer, degrees, coordinates[first])
 
 
 def _to_degrees(xy: NDArray[np.float64], crs: CRS) -> NDArray[np.float64]:
     """Return longitudes and latitudes; NaN for points that are not on the Earth."""
-    to_degrees = Transformer.from_crs(crs, WGS84, always_xy=True)
-    degrees = np.column_stack(to_degrees.transform(xy[:, 0], xy[:, 1]))
+    degrees = transform_points(xy, crs, WGS84)
     degrees[~_valid(degrees)] = np.nan
     return degrees
 
@@ -249,12 +241,14 @@ def _valid(degrees: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _distinct(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
-    return pd.DataFrame(degrees[_valid(degrees)]).drop_duplicates().to_numpy()
+    valid = degrees[_valid(degrees)] + 0.0  # no -0.0
+    _, first = np.unique(valid.view(np.complex128).ravel(), return_index=True)
+    return valid[np.sort(first)]
 
 
 def _require_area(located: _LocatedLayer, metric: CRS | None) -> None:
     """Raise CrsError if the centre of a layer is outside the area of use of its CRS or `metric`."""
-    own: CRS = located.layer.table.crs
+    own = located.layer.known_crs
     centre = _Towns(located.places).centre() if len(located.places) else None
     systems = [own] if metric is None else [own, metric]
     wrong = next((crs for crs in systems if centre is None or not _in_area(centre, crs)), None)
@@ -335,7 +329,7 @@ def _require_plane(
     extents: Sequence[Bounds], places: NDArray[np.float64], metric: CRS, most: float
 ) -> tuple[str, ...]:
     """Raise CrsError if the distortion over the towns exceeds `most`; return notes on it."""
-    xy = np.column_stack(Transformer.from_crs(WGS84, metric, always_xy=True).transform(*places.T))
+    xy = transform_points(places, WGS84, metric)
     distortion = plane_distortion(metric, (*xy.min(axis=0), *xy.max(axis=0)))
     boxes = " and ".join(map(_box, extents[:PLACES_SHOWN]))
     if len(extents) > PLACES_SHOWN:
@@ -381,8 +375,9 @@ def _without_strays(located: _LocatedLayer, towns: _Towns) -> RawLayer:
     rows_lie = "1 row lies" if len(strays) == 1 else f"{len(strays):,} rows lie"
     note = f"{rows_lie} far from all others, at {shown}{more}; left out"
     counts = replace(layer.counts, misplaced=layer.counts.misplaced + len(strays))
-    table = layer.table.drop(index=layer.table.index[strays]).reset_index(drop=True)
-    return replace(layer, table=table, counts=counts, notes=(*layer.notes, note))
+    keep = np.ones(len(layer), bool)
+    keep[strays] = False
+    return layer.select(keep, counts=counts, notes=(*layer.notes, note))
 
 
 def _place(place: tuple[float, float]) -> str:

@@ -121,7 +121,7 @@ def objects_from_frame(
         raw = frame_layers(frame, by_tags)
     else:
         raw = (_by_fields(frame, specs, catalog),)
-    if not any(len(layer.table) for layer in raw):
+    if not any(map(len, raw)):
         raise EmptyResultError(
             f"none of the {len(frame):,} rows of the table is a street object of catalogue "
             f"{catalog.name!r}; check their tags or fields (`semsig sources` lists what is read)."
@@ -211,10 +211,10 @@ def _by_rules(frame: gpd.GeoDataFrame, spec: LayerSpec) -> RawLayer:
     missing = table[list(rules.fields)].isna()
     values = table[list(rules.fields)].astype(object).mask(missing, None)
     rows = Rows(
+        {field: values[field].to_list() for field in rules.fields},
         read=len(table),
         numbers=list(range(1, len(table) + 1)),
         names=[as_text(name) for name in table.index],
-        values=list(values.itertuples(index=False, name=None)),
         positions=table.geometry.to_list(),
     )
     return raw_layer(rows, rules, table.crs, by_file=True)

@@ -5,21 +5,21 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-import geopandas as gpd
 import numpy as np
-import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 import shapely
 
 from semsig_gis.core import (
     CLASS_CODE,
     CLASS_NAME,
     COUNT,
+    GEOMETRY,
     LICENSES,
     SOURCE,
     SOURCE_ID,
-    CrsError,
     Displayed,
     EmptyResultError,
     InputError,
@@ -28,7 +28,7 @@ from semsig_gis.core import (
 from semsig_gis.objects.conflation import ConflationReport, conflate
 from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
-from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
+from semsig_gis.objects.table import arrow_objects, layer_licences, layer_note, with_notes
 from semsig_gis.sources import (
     READERS,
     TAGS_READER,
@@ -37,23 +37,25 @@ from semsig_gis.sources import (
     note_outside,
     paper_taxonomy,
     reader,
+    transformed,
 )
+from semsig_gis.storage import points_to_wkb
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
     from pathlib import Path
 
+    import geopandas as gpd
     from numpy.typing import NDArray
     from pyproj import CRS
 
     from semsig_gis.core import Taxonomy
+    from semsig_gis.objects.table import StreetObjects
     from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer, Role, RowCounts
 
 
 # Objects of a class at the same place, rounded to this, are one object listed several times.
 SAME_PLACE_M = 0.01
-# Column of the original geometries.
-SHAPE = "shape"
 AREA_DIMENSIONS = 2
 
 
@@ -147,73 +149,92 @@ def build_objects(
     """
     system = require_metric_crs(crs)
     layers = tuple(layers)
-    parts = [_positions(layer, taxonomy, system) for layer in layers]
-    if not any(len(rows) for rows, _, _ in parts):
+    parts = [_placed(layer, taxonomy, system) for layer in layers]
+    sizes = [len(part.xy) for part in parts]
+    if not any(sizes):
         raise EmptyResultError(
             f"no object remains of {sum(layer.counts.read for layer in layers)} rows in "
             f"{len(layers)} layers; look at the filters, the area, the geometries and the "
             "coordinate systems."
         )
-    rows = pd.concat([rows for rows, _, _ in parts], ignore_index=True)
     # Layers are identified by number, because two may have the same name.
-    owner = np.repeat(np.arange(len(parts)), [len(rows) for rows, _, _ in parts])
+    owner = np.repeat(np.arange(len(parts)), sizes)
+    ids = pa.chunked_array([part.ids for part in parts]).combine_chunks()
+    codes, xy, shapes = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("codes", "xy", "shapes")
+    )
     # Drop rows with the id of an earlier row, as in a second file of a layer. OpenStreetMap
     # elements have the same id in all files.
     unique = np.array([layer.spec.unique_id or bool(layer.spec.tags) for layer in layers])[owner]
-    has_id = (rows[SOURCE_ID] != "") & unique
-    is_duplicate = (has_id & rows.duplicated([SOURCE, SOURCE_ID])).to_numpy(bool)
+    names, source = np.unique([layer.spec.name for layer in layers], return_inverse=True)
+    numbered = ids.dictionary_encode()
+    keys = source[owner] * len(numbered.dictionary) + numbered.indices.to_numpy()
+    is_duplicate = unique & pc.not_equal(ids, "").to_numpy(zero_copy_only=False)
+    is_duplicate[np.unique(keys, return_index=True)[1]] = False
     duplicates = np.bincount(owner[is_duplicate], minlength=len(parts)).tolist()
-    rows, owner = rows[~is_duplicate].reset_index(drop=True), owner[~is_duplicate]
+    rows = np.flatnonzero(~is_duplicate)
     # Collapse objects of a class at the same place, by layer for the classes in `apart`.
+    counts = np.ones(len(rows), np.int64)
     if collapse:
-        codes = [taxonomy.by_name(name).code for name in apart]
-        group = np.where(rows[CLASS_CODE].isin(codes), owner, -1)
-        rows[["x", "y"]] = _at_points(rows, group)
-        first, counts = _first_at_place(rows, group)
-    else:
-        first, counts = np.arange(len(rows)), np.ones(len(rows), np.int64)
-    rows = rows.iloc[first].reset_index(drop=True)
-    table = gpd.GeoDataFrame(
-        {
-            CLASS_CODE: rows[CLASS_CODE].to_numpy(np.uint8),
-            SOURCE: rows[SOURCE].to_numpy(str).astype(object),
-            SOURCE_ID: rows[SOURCE_ID].to_numpy(str).astype(object),
-            COUNT: counts.astype(np.int32),
-        },
-        geometry=shapely.points(rows["x"].to_numpy(), rows["y"].to_numpy()),
-        crs=system,
-    )
-    remaining = np.bincount(owner[first], minlength=len(parts)).tolist()
+        of_layer = np.isin(codes, [taxonomy.by_name(name).code for name in apart])
+        group = np.column_stack([np.where(of_layer, owner, -1), codes])
+        xy[rows] = _at_points(xy[rows], shapes[rows], group[rows])
+        first, counts = _first_at_place(xy[rows], group[rows])
+        rows = rows[first]
+    remaining = np.bincount(owner[rows], minlength=len(parts)).tolist()
     reports = []
-    for layer, (layer_rows, missing, misplaced), duplicate_count, remaining_count in zip(
+    for layer, part, duplicate_count, remaining_count in zip(
         layers, parts, duplicates, remaining, strict=True
     ):
         row_counts = replace(
             layer.counts,
-            missing=missing,
+            missing=part.missing,
             duplicates=layer.counts.duplicates + duplicate_count,
-            misplaced=layer.counts.misplaced + misplaced,
-            collapsed=len(layer_rows) - duplicate_count - remaining_count,
+            misplaced=layer.counts.misplaced + part.misplaced,
+            collapsed=len(part.xy) - duplicate_count - remaining_count,
         )
         notes = (*layer.notes, *layer.errors)
         reports.append(LayerReport(layer.spec.name, row_counts, notes, classes=layer.spec.classes))
     report = LoadReport(tuple(reports))
-    return StreetObjects(table, taxonomy, layer_licences(layers), report.notes), report
+    columns = {
+        CLASS_CODE: codes[rows],
+        SOURCE: pa.array(names.tolist(), pa.string()).take(pa.array(source[owner[rows]])),
+        SOURCE_ID: ids.take(pa.array(rows)),
+        COUNT: counts.astype(np.int32),
+        GEOMETRY: points_to_wkb(xy[rows]),
+    }
+    objects = arrow_objects(
+        pa.table(columns),
+        xy=xy[rows],
+        crs=system,
+        taxonomy=taxonomy,
+        licenses=layer_licences(layers),
+        notes=report.notes,
+    )
+    return objects, report
 
 
-def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFrame, int, int]:
-    """Return the rows of a layer with a valid position, and the numbers without and misplaced."""
-    table = layer.table
-    if table.crs is None:
-        raise CrsError(
-            f"layer {layer.spec.name!r} has no coordinate reference system; "
-            "state its crs in the catalogue."
-        )
-    geometry = table.geometry
-    usable = ~(geometry.isna() | geometry.is_empty).to_numpy(bool)
-    shapes = geometry[usable]
+class _Placed(NamedTuple):
+    """The rows of a layer with a valid position, and the numbers of the others.
+
+    `shapes` are the geometries in the metric CRS, `xy` their centroids.
+    """
+
+    ids: pa.Array
+    codes: NDArray[np.uint8]
+    xy: NDArray[np.float64]
+    shapes: NDArray[np.object_]
+    missing: int
+    misplaced: int
+
+
+def _placed(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> _Placed:
+    own = layer.known_crs
+    usable = ~(shapely.is_missing(layer.geometry) | shapely.is_empty(layer.geometry))
     # Centroids in the metric CRS, because those in degrees are elsewhere.
-    shapes = (shapes if shapes.crs == crs else shapes.to_crs(crs)).to_numpy()
+    shapes = layer.geometry[usable]
+    shapes = shapes if own == crs else transformed(shapes, own, crs)
     others = shapely.get_type_id(shapes) != shapely.GeometryType.POINT
     points = shapes.copy()
     with np.errstate(invalid="ignore", over="ignore"):  # such rows are dropped below
@@ -223,50 +244,52 @@ def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFr
     coordinates, row = shapely.get_coordinates(points, return_index=True)
     xy[row] = coordinates
     placed = (np.abs(xy) < BEYOND_EARTH_M).all(axis=1)  # false for NaN too
-    codes = {name: taxonomy.by_name(name).code for name in table[CLASS_NAME].unique()}
-    rows = table[usable][placed]
-    result = pd.DataFrame(
-        {
-            SOURCE: layer.spec.name,
-            SOURCE_ID: rows[SOURCE_ID].to_numpy(),
-            CLASS_CODE: rows[CLASS_NAME].map(codes).to_numpy(),
-            "x": xy[placed, 0],
-            "y": xy[placed, 1],
-            SHAPE: shapes[placed],
-        }
+    rows = pa.array(np.flatnonzero(usable)[placed])
+    classes = layer.columns[CLASS_NAME].combine_chunks().dictionary_encode()
+    codes = [taxonomy.by_name(name).code for name in classes.dictionary.to_pylist()]
+    return _Placed(
+        ids=layer.columns[SOURCE_ID].take(rows).cast(pa.string()).combine_chunks(),
+        codes=np.array(codes, np.uint8)[classes.indices.take(rows).to_numpy()],
+        xy=xy[placed],
+        shapes=shapes[placed],
+        missing=int((~usable).sum()),
+        misplaced=int((~placed).sum()),
     )
-    return result, int((~usable).sum()), int((~placed).sum())
 
 
-def _at_points(rows: pd.DataFrame, group: NDArray[np.int64]) -> NDArray[np.float64]:
+def _at_points(
+    xy: NDArray[np.float64], shapes: NDArray[np.object_], group: NDArray[np.int64]
+) -> NDArray[np.float64]:
     """Return positions of objects; an area is moved to the first point of its group in it.
 
     An area and a point of the same class are one object, mapped twice, and the point is more exact.
-    Several points in an area are several objects.
+    Several points in an area are several objects. A group, shape (n, 2), is a layer and a class.
     """
-    xy = rows[["x", "y"]].to_numpy(copy=True)
-    shapes = rows[SHAPE].to_numpy()
     areas = np.flatnonzero(shapely.get_dimensions(shapes) == AREA_DIMENSIONS)
     points = np.flatnonzero(shapely.get_type_id(shapes) == shapely.GeometryType.POINT)
+    if not len(areas):
+        return xy
     area, point = shapely.STRtree(shapes[points]).query(shapes[areas], predicate="covers")
     area, point = areas[area], points[point]
-    codes = rows[CLASS_CODE].to_numpy()
-    same = (group[area] == group[point]) & (codes[area] == codes[point])
+    same = (group[area] == group[point]).all(axis=1)
     order = np.lexsort((point[same], area[same]))
     area, first = np.unique(area[same][order], return_index=True)
-    xy[area] = xy[point[same][order][first]]
-    return xy
+    places = xy.copy()
+    places[area] = xy[point[same][order][first]]
+    return places
 
 
 def _first_at_place(
-    rows: pd.DataFrame, group: NDArray[np.int64]
+    xy: NDArray[np.float64], group: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the first row of every group, class and place, in order, and the number of rows."""
-    places = np.rint(rows[["x", "y"]].to_numpy() / SAME_PLACE_M).astype(np.int64)
-    keys = np.column_stack([group, rows[CLASS_CODE].to_numpy(np.int64), places])
-    _, first, counts = np.unique(keys, axis=0, return_index=True, return_counts=True)
-    order = np.argsort(first)
-    return first[order], counts[order]
+    """Return the first row of every group and place, in order, and the number of rows."""
+    places = np.rint(xy / SAME_PLACE_M).astype(np.int64)
+    keys = np.column_stack([group, places])
+    order = np.lexsort(keys.T)
+    starts = np.flatnonzero((np.diff(keys[order], axis=0, prepend=-2) != 0).any(axis=1))
+    first, counts = order[starts], np.diff(starts, append=len(keys))
+    in_order = np.argsort(first)
+    return first[in_order], counts[in_order]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -522,7 +545,7 @@ def assemble(
         (*report.layers, *building_reports, *street_reports), _unread(catalog, layers, counted)
     )
     return Loaded(
-        objects=replace(objects, notes=(*notes, *report.notes)),
+        objects=with_notes(objects, (*notes, *report.notes)),
         report=report,
         conflation=merged,
         buildings=buildings,
@@ -553,6 +576,8 @@ def _surroundings(
     of_role = [layer for layer in layers if layer.spec.role == role]
     if not of_role:
         return None, ()
+    import pandas as pd  # noqa: PLC0415 - 0.4 s
+
     kind = KIND_OF[role]
     tables, reports = [], []
     for layer in of_role:

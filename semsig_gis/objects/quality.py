@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from semsig_gis.core import COUNT, Displayed, crs_label, degree_bounds, plane_distortion
+from semsig_gis.storage import whole_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -179,7 +180,7 @@ def _class_quality(
     return ClassQuality(
         class_name=item.name,
         objects=number,
-        rows=int(objects.table[COUNT].to_numpy(np.int64)[members].sum()),
+        rows=int(whole_numbers(objects.arrow[COUNT])[members].sum()),
         per_km2_hull=number / hull_km2 if hull_km2 > 0 else None,
         per_km2_occupied=number / occupied_km2,
         nearest_m=_nearest(objects.xy[members]),
@@ -190,12 +191,14 @@ def _nearest(xy: NDArray[np.float64]) -> float | None:
     """Return the median distance to the nearest other point; None for a single point."""
     if len(xy) == 1:
         return None
-    places, counts = np.unique(xy, axis=0, return_counts=True)
+    # As complex numbers, which numpy sorts faster than rows.
+    flat = np.ascontiguousarray(xy).view(np.complex128).ravel()
+    places, counts = np.unique(flat, return_counts=True)
     single = counts == 1
     # Points at the same place have the distance 0; the query of the tree ignores equal points.
     distances = np.zeros(len(xy))
     if single.any():
-        points = np.asarray(shapely.points(places))
+        points = np.asarray(shapely.points(places.real, places.imag))
         _, nearest = shapely.STRtree(points).query_nearest(
             points[single], exclusive=True, all_matches=False, return_distance=True
         )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import geopandas as gpd
 import numpy as np
 import shapely
+from pyproj import CRS
 
 from semsig_gis.core import CLASS_NAME, LICENSES, InputError, SourceError
 from semsig_gis.objects.table import layer_licences
@@ -23,9 +23,9 @@ from semsig_gis.sources import (
     join_areas,
     load_catalog,
     parse_area,
-    read_layer,
     read_parquet,
     reader,
+    transformed,
 )
 from semsig_gis.storage import (
     GROUP_ROWS,
@@ -38,7 +38,7 @@ from semsig_gis.storage import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from pyproj import CRS
+    import geopandas as gpd
 
     from semsig_gis.sources import GeometryKind, RawLayer
 
@@ -63,6 +63,7 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
     Examples
     --------
     >>> import tempfile
+    >>> import geopandas as gpd
     >>> houses = gpd.GeoDataFrame(
     ...     geometry=[shapely.box(0, 0, 5, 5), shapely.box(90, 0, 95, 5)], crs="EPSG:2154"
     ... )
@@ -72,7 +73,7 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
     ...     len(read_surroundings(file, role="buildings", crs="EPSG:2154", box=(0, 0, 9, 9)))
     1
     """
-    ordered = table.iloc[hilbert_order(table.geometry.array)]
+    ordered = table.iloc[hilbert_order(table.bounds.to_numpy())]
     with whole_file(path) as partial:
         ordered.to_parquet(
             partial,
@@ -121,6 +122,7 @@ def read_surroundings(
     Examples
     --------
     >>> import tempfile
+    >>> import geopandas as gpd
     >>> house = shapely.box(*demo_objects.xy[0], *(demo_objects.xy[0] + 5.0))
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = f"{folder}/houses.parquet"
@@ -140,7 +142,7 @@ def select_role(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) 
     if not has_element_columns(frame_fields(table)):
         return table
     (layer,) = frame_layers(table, [load_catalog("openstreetmap").layer(role)])
-    if layer.table.empty:
+    if not len(layer):
         raise InputError(f"the table of OpenStreetMap's elements has no {role}; give one that has.")
     return _with_licences(layer)
 
@@ -161,10 +163,10 @@ def read_area(
     """
     if isinstance(area, str | Path) and NUMBERS.fullmatch(str(area)):
         box = shapely.segmentize(parse_area(str(area)).polygon, EDGE_DEGREES)
-        shapes = gpd.GeoSeries([box], crs=WGS84).to_crs(crs)
+        shapes = transformed(np.array([box]), WGS84, CRS.from_user_input(crs))
     else:
-        shapes = _read(area, "area", crs).geometry
-    joined = join_areas(shapes.to_numpy())
+        shapes = _read(area, "area", crs).geometry.to_numpy()
+    joined = join_areas(shapes)
     if joined is None:
         raise InputError(f"{_named(area)} encloses no area; give {_of_kind(area, 'polygon')}.")
     return joined
@@ -180,7 +182,7 @@ def _read(
     kind = KIND_OF[role]
     notes: tuple[str, ...] = ()
     where = _named(path)
-    if isinstance(path, gpd.GeoDataFrame):
+    if not isinstance(path, str | Path):
         table = path if role == "area" else select_role(path, role)
         table = table if box is None else table.iloc[np.sort(table.sindex.intersection(box))]
     else:
@@ -201,11 +203,11 @@ def _read(
 
 
 def _named(path: object) -> str:
-    return "the table" if isinstance(path, gpd.GeoDataFrame) else str(path)
+    return "the table" if not isinstance(path, str | Path) else str(path)
 
 
 def _of_kind(path: object, kind: str) -> str:
-    return f"a {'table' if isinstance(path, gpd.GeoDataFrame) else 'file'} of {kind}s"
+    return f"a {'table' if not isinstance(path, str | Path) else 'file'} of {kind}s"
 
 
 def _read_file(
@@ -221,7 +223,7 @@ def _read_file(
         return _with_licences(layer), layer.notes
     if path.suffix.lower() in SUFFIXES:
         return read_parquet(path, kind=f"{kind}s", box=box), ()
-    layer = read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
+    (layer,) = reader("vector_file")(path, [LayerSpec(name=role, class_name="", geometry=kind)])
     if layer.errors:
         raise SourceError(
             f"{path} has {layer.counts.unreadable} features that cannot be read "

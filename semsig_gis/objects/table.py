@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import itertools
 from dataclasses import dataclass
@@ -37,6 +38,7 @@ from semsig_gis.storage import (
     bounds_column,
     geo_metadata,
     hilbert_order,
+    points_to_wkb,
     read_geoparquet,
     rows_meeting,
     whole_numbers,
@@ -57,7 +59,8 @@ if TYPE_CHECKING:
 
 KIND = "street objects"
 NUMBERS, TEXTS = {CLASS_CODE, COUNT}, {SOURCE, SOURCE_ID, MERGED}
-COLUMNS = (CLASS_CODE, SOURCE, SOURCE_ID, COUNT)  # columns of all objects, without the geometry
+# Columns without the geometry, and their types; only conflated objects have the last one.
+COLUMNS = {CLASS_CODE: np.uint8, SOURCE: str, SOURCE_ID: str, COUNT: np.int32, MERGED: str}
 BETWEEN_LAYERS = ", "
 BEFORE_LAYERS = ": "
 # Key of the layers of each line of ``licenses``, if the line itself is ambiguous.
@@ -150,6 +153,18 @@ class StreetObjects(Displayed):
         codes.setflags(write=False)
         return codes
 
+    @functools.cached_property
+    def arrow(self) -> pa.Table:
+        """The columns of `table` as an Arrow table, with the geometry as well-known binary."""
+        columns = {
+            name: pa.array(self.table[name].to_numpy(kind))
+            if name in NUMBERS
+            else pa.array(self.table[name].tolist(), pa.string())
+            for name, kind in COLUMNS.items()
+            if name in self.table
+        }
+        return pa.table({**columns, GEOMETRY: points_to_wkb(self.xy)})
+
     @property
     def class_counts(self) -> dict[int, int]:
         """Number of objects by class code; classes without objects are omitted."""
@@ -187,30 +202,40 @@ class StreetObjects(Displayed):
         return map_with("objects_map", self)
 
 
-class _OpenedObjects(StreetObjects):
-    """Street objects of a file, with a table that is created at its first use."""
-
-    _arrow: pa.Table
-
-    @classmethod
-    def of(cls, arrow: pa.Table, **attributes: Any) -> _OpenedObjects:  # noqa: ANN401
-        """Return the objects of an Arrow table, with the values of all other attributes."""
-        objects = cls.__new__(cls)
-        vars(objects).update(attributes, _arrow=arrow)
-        return objects
+class _ArrowObjects(StreetObjects):
+    """Street objects in Arrow, with a GeoDataFrame that is created at its first use."""
 
     @functools.cached_property
     def table(self) -> gpd.GeoDataFrame:
         """The table of objects."""
         import geopandas as gpd  # noqa: PLC0415 - 0.7 s
 
-        merged = [MERGED] if MERGED in self._arrow.column_names else []  # of conflated objects
         columns = {
-            name: self._arrow[name].to_numpy() if name in NUMBERS else self._arrow[name].to_pylist()
-            for name in (*COLUMNS, *merged)
+            name: column.to_numpy() if name in NUMBERS else column.to_pylist()
+            for name, column in zip(self.arrow.column_names, self.arrow.columns, strict=True)
+            if name in {*COLUMNS, MERGED}  # the last one is of conflated objects
         }
-        shapes = shapely.from_wkb(self._arrow[GEOMETRY].to_numpy(zero_copy_only=False))
-        return gpd.GeoDataFrame(columns, geometry=shapes, crs=self.crs)
+        return gpd.GeoDataFrame(columns, geometry=shapely.points(self.xy), crs=self.crs)
+
+
+def arrow_objects(arrow: pa.Table, *, xy: NDArray[np.float64], **attributes: Any) -> StreetObjects:  # noqa: ANN401
+    """Return the street objects of an Arrow table, with positions and all other attributes.
+
+    The columns are those of `StreetObjects.arrow`.
+    """
+    codes = whole_numbers(arrow[CLASS_CODE]).astype(np.uint8)
+    for values in (codes, xy):
+        values.setflags(write=False)
+    objects = _ArrowObjects.__new__(_ArrowObjects)
+    vars(objects).update(attributes, arrow=arrow, codes=codes, xy=xy)
+    return objects
+
+
+def with_notes(objects: StreetObjects, notes: tuple[str, ...]) -> StreetObjects:
+    """Return the same objects with other notes."""
+    result = copy.copy(objects)
+    vars(result)["notes"] = notes
+    return result
 
 
 def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool = False) -> None:
@@ -236,25 +261,15 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
     ...     len(open_objects(f"{folder}/objects.parquet")) == len(demo_objects)
     True
     """
-    table = objects.table
-    if not keep_order:
-        table = table.iloc[hilbert_order(table.geometry.array)]
-    columns = {
-        CLASS_CODE: pa.array(table[CLASS_CODE].to_numpy(np.uint8)),
-        SOURCE: pa.array(table[SOURCE].tolist(), pa.string()),
-        SOURCE_ID: pa.array(table[SOURCE_ID].tolist(), pa.string()),
-        COUNT: pa.array(table[COUNT].to_numpy(np.int32)),
-    }
-    if MERGED in table.columns:
-        columns[MERGED] = pa.array(table[MERGED].tolist(), pa.string())
-    columns[GEOMETRY] = pa.array(shapely.to_wkb(table.geometry.array), pa.binary())
-    columns[BBOX] = bounds_column(shapely.bounds(table.geometry.array))
-    bounds = (*objects.xy.min(axis=0), *objects.xy.max(axis=0))
-    geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=bounds)
+    bounds = np.column_stack([objects.xy, objects.xy])
+    rows = np.arange(len(objects)) if keep_order else hilbert_order(bounds)
+    stored = [name for name in objects.arrow.column_names if name in {*COLUMNS, GEOMETRY}]
+    arrow = objects.arrow.select(stored).take(pa.array(rows))
+    arrow = arrow.append_column(BBOX, bounds_column(bounds[rows]))
+    box = (*objects.xy.min(axis=0), *objects.xy.max(axis=0))
+    geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=box)
     geo["columns"]["geometry"]["covering"] = COVERING
-    write_geoparquet(
-        pa.table(columns), path, geo=geo, group_rows=GROUP_ROWS, specs=objects_specs(objects)
-    )
+    write_geoparquet(arrow, path, geo=geo, group_rows=GROUP_ROWS, specs=objects_specs(objects))
 
 
 def objects_specs(objects: StreetObjects) -> dict[str, Any]:
@@ -269,7 +284,7 @@ def objects_specs(objects: StreetObjects) -> dict[str, Any]:
         "taxonomy": objects.taxonomy.to_list(),
         "licenses": [str(licence) for licence in objects.licenses],
     }
-    if _licences(specs, objects.table[SOURCE]) != objects.licenses:
+    if _licences(specs, objects.arrow[SOURCE].unique().to_pylist()) != objects.licenses:
         specs[LICENSE_LAYERS] = [list(licence.layers) for licence in objects.licenses]
     if objects.notes:
         specs[NOTES] = list(objects.notes)
@@ -369,7 +384,6 @@ def objects_of(
         arrow.validate(full=True)
         _require_columns(arrow)
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
-        codes = whole_numbers(arrow[CLASS_CODE]).astype(np.uint8)
         for code in arrow[CLASS_CODE].unique().to_pylist():
             taxonomy.by_code(code)
         licenses = _licences(specs, arrow[SOURCE].unique().to_pylist())
@@ -386,12 +400,8 @@ def objects_of(
         )
     if box is not None:
         inside = ((xy >= box[:2]) & (xy <= box[2:])).all(axis=1)
-        arrow, codes, xy = arrow.filter(pa.array(inside)), codes[inside], xy[inside]
-    for values in (codes, xy):
-        values.setflags(write=False)
-    return _OpenedObjects.of(
-        arrow, codes=codes, xy=xy, crs=crs, taxonomy=taxonomy, licenses=licenses, notes=notes
-    )
+        arrow, xy = arrow.filter(pa.array(inside)), xy[inside]
+    return arrow_objects(arrow, xy=xy, crs=crs, taxonomy=taxonomy, licenses=licenses, notes=notes)
 
 
 def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
@@ -405,7 +415,7 @@ def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
 
 def _require_columns(arrow: pa.Table) -> None:
     """Raise KeyError for a missing column, TypeError for a column of another type."""
-    arrow.select([*COLUMNS, GEOMETRY])
+    arrow.select([*(name for name in COLUMNS if name != MERGED), GEOMETRY])
     for field in arrow.schema:
         kind = field.type
         if (field.name in NUMBERS and not pa.types.is_integer(kind)) or (

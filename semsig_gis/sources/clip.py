@@ -8,20 +8,21 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-import geopandas as gpd
 import numpy as np
 import shapely
 
 from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, InputError
+from semsig_gis.sources import vector
 from semsig_gis.sources.area import Area, join_areas
+from semsig_gis.sources.layer import transformed
 from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.paths import FILE_SUFFIXES
 from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
-from semsig_gis.sources.vector import file as vector_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import geopandas as gpd
     from numpy.typing import NDArray
 
     from semsig_gis.sources.layer import RawLayer
@@ -36,7 +37,7 @@ POLYGONAL = {"Polygon", "MultiPolygon"}
 
 def parse_area(text: str | gpd.GeoDataFrame) -> Area:
     """Return the area of ``"west,south,east,north"`` in degrees, of polygons, or of a file."""
-    if isinstance(text, gpd.GeoDataFrame):
+    if not isinstance(text, str):
         return _area_of(text.geometry, "the table", name="table", kind="table")
     if names_place(text):
         raise InputError(
@@ -46,7 +47,7 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
     if not NUMBERS.fullmatch(text):
         path = Path(text)
         polygons = LayerSpec(name="area", class_name="", geometry="polygon")
-        layer = vector_file.read_layer(path, polygons)
+        layer = vector.read_layer(path, polygons)
         if layer.errors:
             raise InputError(
                 f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
@@ -127,9 +128,8 @@ def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
     and a row without a position always.
     """
     outside, _ = _outside(layer, area)
-    table = layer.table[~outside].reset_index(drop=True)
     counts = dataclasses.replace(layer.counts, outside=layer.counts.outside + int(outside.sum()))
-    return dataclasses.replace(layer, table=table, counts=counts)
+    return layer.select(~outside, counts=counts)
 
 
 def note_outside(layer: RawLayer) -> RawLayer:
@@ -149,7 +149,7 @@ def note_outside(layer: RawLayer) -> RawLayer:
 
 def _outside(layer: RawLayer, area: Area) -> tuple[NDArray[np.bool_], NDArray[np.object_]]:
     """Return which rows are outside an area, and their geometries as of `_narrowed`."""
-    geometry = layer.table.geometry.to_crs(WGS84).to_numpy()
+    geometry = transformed(layer.geometry, layer.known_crs, WGS84)
     shapely.prepare(area.polygon)
     outside = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
     outside &= ~shapely.covers(area.polygon, geometry)

@@ -18,10 +18,7 @@ from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.numbers import decimal
 from semsig_gis.sources.rows import (
     BadFeatureError,
-    RowRules,
-    Rows,
-    choose_crs,
-    raw_layer,
+    LayerBuilder,
     require_field,
     usable_crs,
 )
@@ -193,19 +190,14 @@ def read_csv_layer(
     table: CsvTable, spec: LayerSpec, *, filters: bool, crs: str | None, where: str
 ) -> RawLayer:
     """Read the layer of a CSV file."""
-    rules = RowRules(spec, table.names, filters=filters, where=where)
-    rows = Rows()
+    builder = LayerBuilder(spec, table.names, filters=filters, where=where)
     for row in table.rows():
-        rows.read += 1
         if isinstance(row, str):
-            rows.errors[rows.read] = row
+            builder.rows.skip(row)
             continue
         try:
             place: Position | str = table.position(row)
         except BadFeatureError as error:
             place = str(error)
-        rows.add([row[field] for field in rules.fields], str(rows.read), place)
-    own = table.crs
-    system, notes = choose_crs(own, expected=spec.crs, requested=crs, where=where)
-    notes = (*table.file.notes, *notes)
-    return raw_layer(rows, rules, system, by_file=own is not None, notes=notes)
+        builder.rows.add(row, str(builder.rows.read + 1), place)
+    return builder.layer(table.crs, requested=crs, notes=table.file.notes)

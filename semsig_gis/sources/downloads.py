@@ -97,7 +97,7 @@ def fetch_layers(
         progress=progress,
     ):
         layers.append(clip_layer(layer, area))
-        rows = size or f"{len(layers[-1].table):,} rows"
+        rows = size or f"{len(layers[-1]):,} rows"
         tell(f"{layer.spec.name}: {rows}; {layer.spec.terms}")
     return tuple(layers)
 

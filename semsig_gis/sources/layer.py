@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Protocol
+import functools
+from dataclasses import astuple, dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from semsig_gis.core import Displayed
+import numpy as np
+import pyarrow as pa
+import shapely
+from pyproj import Transformer
+
+from semsig_gis.core import CrsError, Displayed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from geopandas import GeoDataFrame
+    from numpy.typing import NDArray
+    from pyproj import CRS
 
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.layer_spec import LayerSpec
@@ -47,7 +55,7 @@ class RowCounts:
         return self.read - dropped
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class RawLayer(Displayed):
     """One layer as a reader returns it.
 
@@ -55,13 +63,19 @@ class RawLayer(Displayed):
     ----------
     spec : LayerSpec
         Description of the layer in the catalogue.
-    table : GeoDataFrame
-        One row per feature: ``class_name``, ``source_id`` and ``geometry`` (of any type, empty, or
-        None), in the CRS of the source. For streets also ``half_width`` (metres from the centre
-        line, or NaN) and ``name`` (empty if there is none), where the catalogue gives widths or
-        the field of names.
     counts : RowCounts
-        Number of rows in the source and of rows left out; ``counts.kept == len(table)``.
+        Number of rows in the source and of rows left out; ``counts.kept`` rows are in the layer.
+    columns : pyarrow.Table, optional
+        One row per feature: ``class_name`` and ``source_id``. For streets also ``half_width``
+        (metres from the centre line, or NaN) and ``name`` (empty if there is none), where the
+        catalogue gives widths or the field of names.
+    geometry : array of shapely.Geometry, optional
+        The geometry of every row, shape (n,): of any type, empty, or None.
+    crs : pyproj.CRS, optional
+        CRS of the source.
+    table : GeoDataFrame, optional
+        Columns, geometry and CRS together, instead of the three before it. A layer has this
+        attribute in any case.
     errors : tuple of str
         Errors of the first ten rows that could not be read.
     notes : tuple of str
@@ -73,16 +87,64 @@ class RawLayer(Displayed):
     --------
     >>> from semsig_gis import CitySpec, synthetic_city
     >>> layer = synthetic_city(CitySpec(size=300.0))[0]
-    >>> layer.counts.kept == len(layer.table) <= len(demo_objects)
+    >>> layer.counts.kept == len(layer) <= len(demo_objects)
     True
     """
 
     spec: LayerSpec
-    table: GeoDataFrame
     counts: RowCounts
+    columns: pa.Table
+    geometry: NDArray[np.object_]
+    crs: CRS | None
     errors: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     extent: Area | None = None
+
+    def __init__(
+        self,
+        *,
+        spec: LayerSpec,
+        counts: RowCounts,
+        columns: pa.Table | None = None,
+        geometry: NDArray[np.object_] | None = None,
+        crs: CRS | None = None,
+        table: GeoDataFrame | None = None,
+        errors: tuple[str, ...] = (),
+        notes: tuple[str, ...] = (),
+        extent: Area | None = None,
+    ) -> None:
+        if table is not None:
+            plain = table.drop(columns=table.geometry.name)
+            columns = pa.Table.from_pandas(plain, preserve_index=False).replace_schema_metadata()
+            geometry, crs = table.geometry.to_numpy(), table.crs
+            vars(self)["table"] = table
+        vars(self).update(spec=spec, counts=counts, columns=columns, geometry=geometry, crs=crs,
+                          errors=errors, notes=notes, extent=extent)  # fmt: skip
+
+    def __len__(self) -> int:  # noqa: D105
+        return len(self.geometry)
+
+    @functools.cached_property
+    def table(self) -> GeoDataFrame:
+        """The columns and the geometry as a GeoDataFrame."""
+        import geopandas as gpd  # noqa: PLC0415 - 0.7 s
+
+        return gpd.GeoDataFrame(self.columns.to_pandas(), geometry=self.geometry, crs=self.crs)
+
+    def select(self, rows: NDArray[np.bool_], **changes: Any) -> Self:  # noqa: ANN401
+        """Return the layer with only some rows, and with other changes to its attributes."""
+        columns = self.columns.filter(pa.array(rows))
+        return replace(self, columns=columns, geometry=self.geometry[rows], **changes)
+
+    @property
+    def known_crs(self) -> CRS:
+        """The CRS; CrsError if there is none."""
+        if self.crs is None:
+            raise CrsError(
+                f"layer {self.spec.name!r} has no coordinate reference system; "
+                "state its crs in the catalogue."
+            )
+        return self.crs
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -93,6 +155,23 @@ class RawLayer(Displayed):
             "unreadable": self.counts.unreadable,
             "notes": len(self.notes),
         }
+
+
+def transformed(geometry: NDArray[np.object_], old: CRS, new: CRS) -> NDArray[np.object_]:
+    """Return geometries in another CRS, without a third dimension."""
+    if old.is_exact_same(new):
+        return geometry
+    return np.asarray(shapely.transform(geometry, lambda xy: transform_points(xy, old, new)))
+
+
+def transform_points(xy: NDArray[np.float64], old: CRS, new: CRS) -> NDArray[np.float64]:
+    """Return coordinates in another CRS, shape (n, 2); longitude comes before latitude."""
+    return np.column_stack(_transformer(old, new).transform(xy[:, 0], xy[:, 1]))
+
+
+@functools.lru_cache(maxsize=16)  # 20 ms each
+def _transformer(old: CRS, new: CRS) -> Transformer:
+    return Transformer.from_crs(old, new, always_xy=True)
 
 
 class Reader(Protocol):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-import geopandas as gpd
 import pyarrow.parquet as pq
 import shapely
 
@@ -16,6 +15,8 @@ from semsig_gis.storage import UNREADABLE, VERIFY_CHECKSUMS, check_footer_checks
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
     from pathlib import Path
+
+    import geopandas as gpd
 
 SUFFIXES = frozenset({".geoparquet", ".parquet"})
 
@@ -42,6 +43,8 @@ def read_parquet(
 
     Only `columns` that exist are read, and the geometry. SourceError if the file cannot be read.
     """
+    import geopandas as gpd  # noqa: PLC0415 - 0.7 s
+
     require_file(path, f"a file of {kind}")
     try:
         check_footer_checksum(path)

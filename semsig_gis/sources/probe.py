@@ -6,8 +6,7 @@ import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from semsig_gis.sources import parquet
-from semsig_gis.sources.vector.file import spatial_layers
+from semsig_gis.sources import parquet, vector
 from semsig_gis.sources.vector.member import DRIVERS
 
 if TYPE_CHECKING:
@@ -60,5 +59,5 @@ def _probe(path: Path, suffix: str, stamp: tuple[tuple[int, int, int], ...]) -> 
             start = stream.read(OVERPASS_START_BYTES)
         if b'"elements"' in start and b'"Feature' not in start:
             return FileProbe("overpass")
-    layers = spatial_layers(path)
+    layers = vector.spatial_layers(path)
     return FileProbe("vector", layers, tuple(layer.fields for _, layer in layers))

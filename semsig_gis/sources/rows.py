@@ -1,25 +1,25 @@
-"""Build a `RawLayer` from the rows that a reader collects, column by column."""
+"""Rows of all sources, column by column, and the rules that make a `RawLayer` of them."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import datetime as dt
 import functools
-import itertools
 import math
 import re
 from collections import Counter
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
-import geopandas as gpd
 import numpy as np
-import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core import (
     CLASS_NAME,
-    GEOMETRY,
     HALF_WIDTH,
     NAME,
     SOURCE_ID,
@@ -34,7 +34,7 @@ from semsig_gis.sources.layer_spec import MAX_WIDTH_M, MIN_WIDTH_M
 from semsig_gis.sources.numbers import decimal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -157,35 +157,91 @@ class BadFeatureError(ValueError):
 
 @dataclasses.dataclass(slots=True)
 class Rows:
-    """Rows of a layer as a reader collects them, in four lists of equal length.
+    """Rows of a layer as a reader collects them, by column.
 
-    `numbers` count from 1 in the order of the file; `names` are the identifiers that do not come
-    from a field; `values` are the values of `RowRules.fields`; `positions` has a text instead of a
-    position for a row that cannot be used. `read` counts all rows, `filtered` the rows that the
-    reader leaves out, `closed` the rows with rings that were closed. `errors` has the error by row
-    number of rows without values.
+    `columns` has the values of each field, as an Arrow column or a list. The lists `numbers` (from
+    1, in the order of the file), `names` (the identifiers that do not come from a field) and
+    `positions` are as long; a text instead of a position is the error of the row. `read` counts all
+    rows, `filtered` the rows that the reader leaves out, `closed` the rows with rings that were
+    closed. `errors` has the error by row number of rows without values.
     """
 
+    columns: dict[str, Any]
     read: int = 0
     filtered: int = 0
     closed: int = 0
     errors: dict[int, str] = dataclasses.field(default_factory=dict)
     numbers: list[int] = dataclasses.field(default_factory=list)
     names: list[str] = dataclasses.field(default_factory=list)
-    values: list[Sequence[Any]] = dataclasses.field(default_factory=list)
     positions: list[Position | str] = dataclasses.field(default_factory=list)
 
-    def add(self, values: Sequence[Any], name: str, position: Position | str) -> None:
-        """Add the row with the number `read`."""
+    @classmethod
+    def of(cls, fields: Iterable[str]) -> Self:
+        """Return no rows of these fields."""
+        return cls({field: [] for field in fields})
+
+    def add(self, values: Mapping[str, Any], name: str, position: Position | str) -> None:
+        """Add the next row; a field without a value is missing."""
+        row = len(self.numbers)
+        self.read += 1
         self.numbers.append(self.read)
         self.names.append(name)
-        self.values.append(values)
         self.positions.append(position)
+        # A column ends at its last value: most elements of OpenStreetMap have few of the tags.
+        for field in self.columns.keys() & values.keys():
+            column = self.columns[field]
+            column += [None] * (row - len(column))
+            column.append(values[field])
+
+    def column(self, field: str) -> Sequence[Any] | pa.Array:
+        """Return the value of every row in a field, None where it is missing."""
+        column = self.columns[field]
+        if isinstance(column, list):
+            column += [None] * (len(self.numbers) - len(column))
+        return column
+
+    def skip(self, error: str | None = None) -> None:
+        """Count the next row as filtered, or with an error as unreadable."""
+        self.read += 1
+        if error is None:
+            self.filtered += 1
+        else:
+            self.errors[self.read] = error
 
     def mark_unreadable(self, count: int, reason: str) -> None:
         """Count the rows from the next one up to number `count` as unreadable."""
         self.errors.update(dict.fromkeys(range(self.read + 1, count + 1), reason))
         self.read = max(self.read, count)
+
+
+class LayerBuilder:
+    """A layer while its rows are read: its rules and the rows."""
+
+    def __init__(
+        self, spec: LayerSpec, fields: Sequence[str], *, filters: bool, where: str
+    ) -> None:
+        self.spec = spec
+        self.rules = RowRules(spec, fields, filters=filters, where=where)
+        self.rows = Rows.of(self.rules.fields)
+
+    def layer(
+        self,
+        own: CRS | None,
+        *,
+        requested: str | None,
+        implicit: bool = False,
+        notes: tuple[str, ...] = (),
+    ) -> RawLayer:
+        """Return the layer of all rows; its CRS is chosen by `choose_crs`."""
+        crs, more = choose_crs(
+            own,
+            implicit=implicit,
+            expected=self.spec.crs,
+            requested=requested,
+            where=self.rules.file,
+        )
+        by_file = own is not None and not implicit
+        return raw_layer(self.rows, self.rules, crs, by_file=by_file, notes=(*notes, *more))
 
 
 def raw_layer(
@@ -197,45 +253,52 @@ def raw_layer(
     coordinates are not.
     """
     spec = rules.spec
-    filtered = rules.apply(rows)
-    table = filtered.table
+    passed = rules.apply(rows)
+    columns, numbers = passed.columns, passed.numbers
+    positions = [rows.positions[row] for row in passed.rows.tolist()]
     # A position that is a text is an error; build the geometries of the others.
-    broken = table[GEOMETRY][[isinstance(position, str) for position in table[GEOMETRY]]]
-    errors: dict[int, str] = {**rows.errors, **dict(zip(broken.index, broken, strict=True))}
-    table = table.drop(index=broken.index)
-    table[GEOMETRY] = pd.Series(built_geometries(table[GEOMETRY]), table.index, dtype=object)
+    readable = np.array([not isinstance(position, str) for position in positions], bool)
+    errors: dict[int, str] = {**rows.errors}
+    errors.update(
+        (int(numbers[row]), str(positions[row])) for row in np.flatnonzero(~readable).tolist()
+    )
+    geometry = built_geometries(position for position in positions if not isinstance(position, str))
+    columns, numbers = columns.filter(pa.array(readable)), numbers[readable]
     # Rows with coordinates that are not usable are errors, too.
-    if bad := _coordinate_errors(table, crs, by_file=by_file, file=rules.file):
-        errors |= bad
-        table = table.drop(index=list(bad))
+    bad = _coordinate_errors(geometry, numbers, crs, by_file=by_file, file=rules.file)
+    errors |= bad
+    keep = ~np.isin(numbers, list(bad))
     repeated = 0
     if spec.unique_id:
         tolerance = APART_DEGREES if crs.is_geographic else APART_METRES
-        table, repeated, more = _drop_duplicate_ids(table, tolerance=tolerance)
+        first, more = _first_of_ids(columns[SOURCE_ID].to_pylist(), geometry, keep, tolerance)
+        repeated = int(keep.sum() - first.sum())
+        keep = first
         notes += more
-    geometry = table[GEOMETRY].to_numpy()
+    columns, geometry = columns.filter(pa.array(keep)), geometry[keep]
     if crs.is_projected and not by_file and fits_the_globe(shapely.get_coordinates(geometry)):
         notes += (f"the coordinates look like degrees, yet {crs_label(crs)} is stated",)
-    notes += tuple(_deviations(rows.read, table, spec))
+    notes += tuple(_deviations(rows.read, columns, geometry, spec))
     if rows.closed:
         notes += (f"{rows.closed} of {rows.read} rows have rings that are not closed; closed here",)
     if spec.tags and errors:  # elements of OpenStreetMap; count the causes
         causes = Counter(SHARE.sub("some of its", e.partition(" ")[2]) for e in errors.values())
         listed = ", ".join(f"{cause} ({number:,})" for cause, number in causes.most_common())
         notes += (f"unreadable: {listed}",)
-    table = table.drop(columns=GEOMETRY).reset_index(drop=True)
     return RawLayer(
         spec=spec,
-        table=gpd.GeoDataFrame(table, geometry=geometry, crs=crs),
+        columns=columns,
+        geometry=geometry,
+        crs=crs,
         counts=RowCounts(
             read=rows.read,
             unreadable=len(errors),
-            filtered=rows.filtered + filtered.filtered,
-            excluded=filtered.excluded,
+            filtered=rows.filtered + passed.filtered,
+            excluded=passed.excluded,
             duplicates=repeated,
         ),
         errors=tuple(f"row {row}: {text}" for row, text in sorted(errors.items())[:MOST_ERRORS]),
-        notes=(*filtered.notes, *notes),
+        notes=(*passed.notes, *notes),
     )
 
 
@@ -251,13 +314,18 @@ def built_geometries(positions: Iterable[Position]) -> NDArray[np.object_]:
 
 
 def _coordinate_errors(
-    table: pd.DataFrame, crs: CRS, *, by_file: bool, file: str
+    geometry: NDArray[np.object_],
+    numbers: NDArray[np.int64],
+    crs: CRS,
+    *,
+    by_file: bool,
+    file: str,
 ) -> dict[int, str]:
     """Return the errors of rows with coordinates that are not finite, or out of range in degrees.
 
     CrsError if most of the finite coordinates are out of range.
     """
-    xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
+    xy, owner = shapely.get_coordinates(geometry, return_index=True)
     not_finite = ~np.isfinite(xy).all(axis=1)
     usable = ~np.isin(owner, owner[not_finite])
     wrong = off_the_globe(xy, crs) & usable
@@ -275,55 +343,117 @@ def _coordinate_errors(
         )
     errors: dict[int, str] = {}
     for rows, what in ((not_finite, "are not finite"), (wrong, f"are not in {crs_label(crs)}")):
-        for number, (x, y) in zip(table.index[owner[rows]], xy[rows], strict=True):
+        for number, (x, y) in zip(numbers[owner[rows]].tolist(), xy[rows], strict=True):
             errors.setdefault(number, f"its coordinates ({x:.12g}, {y:.12g}) {what}")
     return errors
 
 
-def _drop_duplicate_ids(
-    table: pd.DataFrame, *, tolerance: float
-) -> tuple[pd.DataFrame, int, tuple[str, ...]]:
-    """Keep the first row of each id, or the first one with a position if there is one."""
-    geometry = table[GEOMETRY].to_numpy()
+def _first_of_ids(
+    ids: Sequence[str],
+    geometry: NDArray[np.object_],
+    keep: NDArray[np.bool_],
+    tolerance: float,
+) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Return which rows of `keep` are the first of their id, and a note on distant ones.
+
+    The first row with a position comes before rows without one.
+    """
     nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)
-    # Rows with a position come first.
-    ids = table[SOURCE_ID].iloc[np.argsort(nowhere, kind="stable")]
-    ids = ids[ids != ""]
-    firsts, repeated = ids.drop_duplicates(), ids[ids.duplicated()]
-    # Distance of each dropped row from the row that is kept.
-    first_of = pd.Series(firsts.index, index=firsts).loc[repeated]
-    here, there = table[GEOMETRY].loc[repeated.index], table[GEOMETRY].loc[first_of]
-    metres = shapely.distance(here.to_numpy(), there.to_numpy())  # NaN where there is no position
+    first_rows: dict[str, int] = {}
+    firsts, repeats = [], []
+    for row in np.flatnonzero(keep)[np.argsort(nowhere[keep], kind="stable")].tolist():
+        first = first_rows.setdefault(ids[row], row)
+        if ids[row] and first != row:
+            firsts.append(first)
+            repeats.append(row)
+    result = keep.copy()
+    result[repeats] = False
+    metres = shapely.distance(geometry[firsts], geometry[repeats])  # NaN if there is no position
     far = int((metres > tolerance).sum())
     note = f"{far} rows have the id of a row at another place; the place of the first row is used"
-    return table.drop(index=repeated.index), len(repeated), (note,) if far else ()
+    return result, (note,) if far else ()
 
 
-def _deviations(read: int, table: pd.DataFrame, spec: LayerSpec) -> Iterable[str]:
+def _deviations(
+    read: int, columns: pa.Table, geometry: NDArray[np.object_], spec: LayerSpec
+) -> Iterable[str]:
     """Yield the differences between a layer and its specification."""
     if read == 0:
         yield "the layer has no rows"
     elif spec.rows is not None and not spec.rows[0] <= read <= spec.rows[1]:
         least, most = spec.rows
         yield f"the layer has {read} rows, and {least} to {most} were expected"
-    types = pd.Series([item.geom_type for item in table[GEOMETRY].dropna()], dtype="str")
-    others = types[~types.isin(GEOMETRY_TYPES[spec.geometry])]
-    if len(others) and not spec.tags:  # each element of OpenStreetMap states its own type
-        names = ", ".join(sorted(others.unique()))
-        yield f"{len(others)} of {read} rows are {names}, not {spec.geometry}"
-    unknown = table[HALF_WIDTH].isna().sum() if spec.has_width else 0
+    kinds, samples, counts = np.unique(
+        shapely.get_type_id(geometry), return_index=True, return_counts=True
+    )
+    others = {
+        geometry[row].geom_type: int(count)
+        for kind, row, count in zip(kinds, samples, counts, strict=True)
+        if kind >= 0 and geometry[row].geom_type not in GEOMETRY_TYPES[spec.geometry]
+    }
+    if others and not spec.tags:  # each element of OpenStreetMap states its own type
+        listed = ", ".join(sorted(others))
+        yield f"{sum(others.values())} of {read} rows are {listed}, not {spec.geometry}"
+    unknown = int(np.isnan(columns[HALF_WIDTH].to_numpy()).sum()) if spec.has_width else 0
     if unknown:
-        yield f"{unknown} of {len(table)} streets have no known width"
+        yield f"{unknown} of {len(columns)} streets have no known width"
+
+
+class _CodedColumn:
+    """The distinct values of a field, and the index of the value of every row.
+
+    What a rule says about a value is computed once for each distinct value.
+    """
+
+    def __init__(self, values: Sequence[Any] | pa.Array) -> None:
+        if not isinstance(values, pa.Array):
+            with contextlib.suppress(pa.ArrowInvalid, pa.ArrowTypeError, UnicodeError):
+                values = pa.array(values, pa.string())
+        if isinstance(values, pa.Array):
+            try:
+                coded = values.dictionary_encode("encode")
+            except pa.ArrowNotImplementedError:  # lists and structures
+                values = values.to_pylist()
+            else:
+                self.values = [plain(value) for value in coded.dictionary.to_pylist()]
+                self.codes = coded.indices.to_numpy()
+                return
+        # Values of JSON have any types; 1, 1.0 and true are equal, but not as texts.
+        codes: dict[object, int] = {}
+        keys = ((type(v), v if v.__hash__ else id(v)) for v in values)
+        self.codes = np.array([codes.setdefault(key, len(codes)) for key in keys], np.int64)
+        _, first = np.unique(self.codes, return_index=True)
+        self.values = [plain(values[row]) for row in first.tolist()]
+
+    def map(self, rule: Callable[[Any], Any], kind: type) -> NDArray[Any]:
+        """Return the result of a rule for the value of every row, as an array of this type."""
+        results: NDArray[Any] = np.array([rule(v) for v in self.values], kind)[self.codes]
+        return results
+
+    def texts(self, rule: Callable[[Any], str | None]) -> pa.Array:
+        """Return the text that a rule gives for the value of every row, as an Arrow column."""
+        return pa.array(map(rule, self.values), pa.string()).take(pa.array(self.codes))
+
+
+def plain(value: object) -> object:
+    """Return dates and times as text in ISO 8601 without a time zone, others unchanged."""
+    if isinstance(value, dt.datetime):
+        return value.replace(tzinfo=None).isoformat()
+    return value.isoformat() if isinstance(value, dt.date | dt.time) else value
 
 
 @dataclasses.dataclass(frozen=True, eq=False, slots=True)
 class FilteredRows:
     """Rows that pass the rules of a layer, and the numbers of rows left out.
 
-    Rows are `filtered` by ``where`` or ``class_by``, and `excluded` by ``not``.
+    `rows` are the indices of the rows that pass, `numbers` their row numbers, `columns` their
+    class, identifier, half-width in metres and name. Rows are `filtered` by ``where`` or
+    ``class_by``, and `excluded` by ``not``.
     """
 
-    table: pd.DataFrame
+    columns: pa.Table
+    rows: NDArray[np.int64]
+    numbers: NDArray[np.int64]
     filtered: int
     excluded: int
     notes: tuple[str, ...]
@@ -356,86 +486,92 @@ class RowRules:
         self.fields = tuple(dict.fromkeys(column for _, column in uses))
 
     def apply(self, rows: Rows) -> FilteredRows:
-        """Return class, identifier, half-width in metres, name and position of rows that pass.
+        """Return class, identifier, half-width in metres and name of the rows that pass.
 
-        The index has the row numbers. An unknown half-width is NaN, and an unknown name is empty. A
-        row without an id has its number as identifier, or an empty one where ids are unique,
-        because the number could be the id of another row.
+        An unknown half-width is NaN, and an unknown name is empty. A row without an id has its
+        number as identifier, or an empty one where ids are unique, because the number could be the
+        id of another row.
         """
-        spec = self.spec
-        size = len(rows.numbers)
-        columns = dict(zip(self.fields, zip(*rows.values, strict=True), strict=False))
+        spec, size = self.spec, len(rows.numbers)
+        columns = {field: _CodedColumn(rows.column(field)) for field in self.fields}
         passed = np.ones(size, bool)
-        for field, condition in self._where if size else ():
-            passed &= [condition.accepts(value) for value in columns[field]]
+        for field, condition in self._where:
+            passed &= columns[field].map(condition.accepts, bool)
         filtered = size - int(passed.sum())
         excluded: dict[str, int] = {}
-        for field, condition in self._not if size else ():
-            out = passed & [condition.accepts(value, every=True) for value in columns[field]]
+        for field, condition in self._not:
+            out = passed & columns[field].map(
+                functools.partial(condition.accepts, every=True), bool
+            )
             excluded[field] = int(out.sum())
             passed &= ~out
-        classes = self._classes(columns, size)
-        unlisted = passed & np.array([name is None for name in classes], bool)
-        ids = columns.get(spec.id_field or "", [None] * size)
-        names = [""] * size if spec.unique_id else rows.names
-        titles = columns.get(spec.name_field or "", [None] * size)
-        table = pd.DataFrame(
-            {
-                CLASS_NAME: pd.Series(classes, dtype="str"),
-                SOURCE_ID: pd.Series(map(_identifier, ids, names), dtype="str"),
-                HALF_WIDTH: pd.Series(self._half_widths(columns, size), dtype="float64"),
-                NAME: pd.Series([_identifier(title, "") for title in titles], dtype="str"),
-                GEOMETRY: pd.Series(rows.positions, dtype=object),
-            }
-        ).set_index(pd.Index(rows.numbers, dtype=int))
-        unused = [HALF_WIDTH] * (not spec.has_width) + [NAME] * (spec.name_field is None)
         notes = []
         if any(excluded.values()):
             listed = (f"{field} {number}" for field, number in excluded.items() if number)
             notes.append(f"left out by the catalogue's not: {', '.join(listed)}")
-        if unlisted.any():
-            notes.append(self._unlisted(columns, unlisted))
+        by, name = spec.class_by, spec.class_name
+        classes = pa.repeat(pa.scalar(name), size)
+        if by is not None and spec.role == "objects":
+            default = name if by.otherwise else None
+            classes = columns[by.field].texts(
+                lambda value: _first(by.classes, value, default) or None
+            )
+            unlisted = passed & classes.is_null().to_numpy(zero_copy_only=False)
+            if unlisted.any():
+                notes.append(_unlisted(columns[by.field], unlisted, by.field, name))
+                filtered += int(unlisted.sum())
+                passed &= ~unlisted
+        result = {CLASS_NAME: classes, SOURCE_ID: _texts(columns, spec.id_field, size)}
+        if not spec.unique_id:
+            no_id = pc.equal(result[SOURCE_ID], "")
+            result[SOURCE_ID] = pc.if_else(
+                no_id, pa.array(rows.names, pa.string()), result[SOURCE_ID]
+            )
+        if spec.has_width:
+            result[HALF_WIDTH] = pa.array(self._half_widths(columns, size))
+        if spec.name_field is not None:
+            result[NAME] = _texts(columns, spec.name_field, size)
         return FilteredRows(
-            table[passed & ~unlisted].drop(columns=unused),
-            filtered=filtered + int(unlisted.sum()),
+            pa.table(result).filter(pa.array(passed)),
+            np.flatnonzero(passed),
+            np.array(rows.numbers, np.int64)[passed],
+            filtered=filtered,
             excluded=sum(excluded.values()),
             notes=tuple(notes),
         )
 
-    def _classes(self, columns: Mapping[str, Sequence[Any]], size: int) -> list[str | None]:
-        """Return the class of each row, None for a value that `class_by` does not list."""
-        by, name = self.spec.class_by, self.spec.class_name
-        if by is None or self.spec.role != "objects":
-            return [name] * size
-        default = name if by.otherwise else None
-        values = columns.get(by.field, ())
-        return [_first(by.classes, value, default) or None for value in values]
-
-    def _unlisted(self, columns: Mapping[str, Sequence[Any]], rows: NDArray[np.bool_]) -> str:
-        """Return a note on the values that `class_by` does not list, the most frequent first."""
-        by, name = self.spec.class_by, self.spec.class_name
-        if by is None:
-            return ""
-        values = itertools.compress(columns[by.field], rows)
-        counts = Counter(
-            "no value" if v is None else repr(as_text(v)[:MOST_VALUE_CHARACTERS]) for v in values
-        )
-        listed = [f"{value} {number}" for value, number in counts.most_common(MOST_UNLISTED)]
-        others = len(counts) - len(listed)
-        listed += [f"and {others} others"] if others else []
-        remedy = f'; write otherwise = "class" to take them as {name}' if name else ""
-        return f"left out, unlisted in class_by {by.field!r}: {', '.join(listed)}{remedy}"
-
-    def _half_widths(self, columns: Mapping[str, Sequence[Any]], size: int) -> NDArray[np.float64]:
+    def _half_widths(self, columns: Mapping[str, _CodedColumn], size: int) -> NDArray[np.float64]:
         by, own = self.spec.width_by, self.spec.width_field
         widths = np.full(size, math.nan)
-        if own is not None and size:
-            widths = np.array([_metres(value) for value in columns[own]])
-        if by is not None and size:
+        if own is not None:
+            widths = columns[own].map(_metres, float)
+        if by is not None:
             default = math.nan if by.default is None else by.default
-            typical = [_first(by.widths, value, default) for value in columns[by.field]]
+            typical = columns[by.field].map(lambda value: _first(by.widths, value, default), float)
             widths = np.where(np.isnan(widths), typical, widths)
         return widths / 2
+
+
+def _texts(columns: Mapping[str, _CodedColumn], field: str | None, size: int) -> pa.Array:
+    """Return the identifiers or names in a field, empty where there is none."""
+    if field is None:
+        return pa.repeat(pa.scalar(""), size)
+    return columns[field].texts(_identifier)
+
+
+def _unlisted(column: _CodedColumn, rows: NDArray[np.bool_], field: str, class_name: str) -> str:
+    """Return a note on the values that `class_by` does not list, the most frequent first."""
+    counts: Counter[str] = Counter()
+    codes, first, numbers = np.unique(column.codes[rows], return_index=True, return_counts=True)
+    for place in np.argsort(first).tolist():
+        value = column.values[codes[place]]
+        shown = "no value" if value is None else repr(as_text(value)[:MOST_VALUE_CHARACTERS])
+        counts[shown] += int(numbers[place])
+    listed = [f"{value} {number}" for value, number in counts.most_common(MOST_UNLISTED)]
+    others = len(counts) - len(listed)
+    listed += [f"and {others} others"] if others else []
+    remedy = f'; write otherwise = "class" to take them as {class_name}' if class_name else ""
+    return f"left out, unlisted in class_by {field!r}: {', '.join(listed)}{remedy}"
 
 
 def _first(choices: Iterable[tuple[Value, T]], value: object, default: T) -> T:
@@ -443,10 +579,10 @@ def _first(choices: Iterable[tuple[Value, T]], value: object, default: T) -> T:
     return next((result for accepted, result in choices if matches(value, accepted)), default)
 
 
-def _identifier(value: object, name: str) -> str:
+def _identifier(value: object) -> str:
     text = "" if value is None else as_text(value).strip()
     whole = WHOLE_FLOAT.fullmatch(text)
-    return (whole[1] if whole else text) or name
+    return whole[1] if whole else text
 
 
 def _metres(value: object) -> float:

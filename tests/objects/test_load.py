@@ -85,13 +85,12 @@ def test_values_of_other_classes_match_no_pattern_of_the_paper() -> None:
     kiosks = LayerSpec(name="kiosks", class_name="kiosk")
     (own,) = choose_layers(catalog_of(layers=(bays, kiosks)), selection="paper")
     rules = RowRules(own, ["type"], filters=True, where="bays")
-    rows = Rows()
+    rows = Rows.of(rules.fields)
     for text in ("Taxi VIP", "Taxi", "other"):
-        rows.read += 1
-        rows.add([text], text, (0.0, 0.0))
+        rows.add({"type": text}, text, (0.0, 0.0))
     assert own.classes == ("taxi_station",)
     filtered = rules.apply(rows)
-    assert filtered.table["source_id"].tolist() == ["Taxi"]
+    assert filtered.columns["source_id"].to_pylist() == ["Taxi"]
     assert filtered.notes == ("left out, unlisted in class_by 'type': 'Taxi VIP' 1, 'other' 1",)
 
 

@@ -19,6 +19,7 @@ from sentences import refused
 
 from semsig_gis.core import CrsError, InputError, SemsigError
 from semsig_gis.sources import (
+    RawLayer,
     RowCounts,
     clip_layer,
     clip_layers,
@@ -31,7 +32,6 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.sources import RawLayer
 
 BOX = (3.8, 43.5, 3.9, 43.7)
 
@@ -173,7 +173,8 @@ def test_layer_is_clipped(role: str, ids: list[str], crs: str) -> None:
     lines = [inside, across, outside, None]
     layer = raw_layer(lines, ids=["1", "2", "3", "none"], crs="EPSG:4326", filtered=5)
     spec = replace(layer.spec, role=role, geometry="line")  # type: ignore[arg-type]
-    layer = replace(layer, spec=spec, table=layer.table.to_crs(crs))
+    table = layer.table.to_crs(crs)
+    layer = RawLayer(spec=spec, counts=layer.counts, table=table)
     clipped = clip_layer(layer, parse_area(",".join(map(str, BOX))))
     assert clipped.table["source_id"].tolist() == ids
     assert clipped.table.index.tolist() == list(range(len(ids)))

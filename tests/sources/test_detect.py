@@ -14,9 +14,11 @@ from sentences import refused, sentence
 
 from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources import detect_catalogs, probe_file
+from semsig_gis.sources.vector import by_pyogrio, geojson
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from types import ModuleType
 
     from conftest import Run
 
@@ -80,25 +82,33 @@ def test_load_without_catalog_detects_it(run: Run, tmp_path: Path) -> None:
     sentence(run("load", trees, "--out", tmp_path / "none.parquet"), "trees.gpkg", "--catalog")
 
 
-def test_load_without_catalog_describes_a_file_once(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", ["benches.geojson", "benches.gpkg"])
+def test_load_without_catalog_opens_a_file_twice(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
+    """The description and the rows are read once each, whatever steps need them."""
     calls: list[str] = []
 
-    def count(name: str) -> None:
-        function = getattr(pyogrio, name)
+    def count(module: ModuleType, name: str) -> None:
+        function = getattr(module, name)
 
         def counted(*arguments: object, **options: object) -> object:
             calls.append(name)
             return function(*arguments, **options)
 
-        monkeypatch.setattr(pyogrio, name, counted)
+        monkeypatch.setattr(module, name, counted)
 
-    count("list_layers")
-    count("read_info")
-    path = write(tmp_path, "benches.geojson")
+    count(geojson, "parse_json")
+    for function in ("open_arrow", "read"):
+        count(by_pyogrio, function)
+    for function in ("read_info", "list_layers", "read_dataframe", "read_arrow"):
+        count(pyogrio, function)
+    path = write(tmp_path, name, rows=2_000)
     assert run("load", path, "--out", tmp_path / "objects.parquet")[0] == 0
-    assert calls == ["read_info"]
+    # Only a GeoPackage has to be opened to list its layers.
+    lists = ["list_layers"] if name.endswith("gpkg") else []
+    description = "read_info" if lists else "parse_json"
+    assert calls == [*lists, description, "open_arrow"]
 
 
 def test_changed_file_is_probed_again(tmp_path: Path) -> None:
@@ -111,4 +121,5 @@ def test_changed_file_is_probed_again(tmp_path: Path) -> None:
     path = tmp_path / "benches.shp"
     before = probe_file(path)
     path.with_suffix(".prj").unlink()
-    assert before.layers[0][1].crs != probe_file(path).layers[0][1].crs == ""
+    assert before.layers[0][1].crs is not None
+    assert probe_file(path).layers[0][1].crs is None

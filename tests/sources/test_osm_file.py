@@ -105,13 +105,13 @@ def test_values_are_compared_exactly(tags: dict[str, str], *, expected: bool) ->
     stop = (("public_transport", ("platform",)), ("bus", ("yes", "designated")))
     spec = LayerSpec(name="things", class_name="bench", tags=(tree, sign, stop, building))
     assert has_tags(tags, spec) is expected
-    assert TagIndex([spec]).layers(tags) == [0] * expected
+    assert TagIndex([spec]).layers(tags) == (0,) * expected
 
 
 @given(st.lists(SPECS, min_size=1, max_size=4), TAGS)
 def test_tag_index_equals_linear_search(specs: list[LayerSpec], tags: dict[str, str]) -> None:
     index = TagIndex(specs)
-    expected = [number for number, spec in enumerate(specs) if has_tags(tags, spec)]
+    expected = tuple(number for number, spec in enumerate(specs) if has_tags(tags, spec))
     assert index.layers(tags) == expected
     if expected:
         assert set(index.keys) & set(tags)

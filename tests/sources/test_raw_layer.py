@@ -29,8 +29,6 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import pandas as pd
-
     from semsig_gis.sources import FilteredRows, RawLayer
 
 
@@ -70,24 +68,23 @@ def test_limits_apply_only_to_degrees() -> None:
 def apply(spec: LayerSpec, **columns: Sequence[object]) -> FilteredRows:
     """Return what the rules of a layer make of rows with these fields."""
     rules = RowRules(spec, list(columns), filters=True, where="here")
-    rows = Rows()
-    for row in zip(*columns.values(), strict=True):
-        rows.read += 1
-        values = dict(zip(columns, row, strict=True))
-        rows.add([values[field] for field in rules.fields], str(rows.read), (0.0, 0.0))
+    rows = Rows.of(rules.fields)
+    for number, row in enumerate(zip(*columns.values(), strict=True), start=1):
+        rows.add(dict(zip(columns, row, strict=True)), str(number), (0.0, 0.0))
     return rules.apply(rows)
 
 
-def table(spec: LayerSpec, **columns: Sequence[object]) -> pd.DataFrame:
-    return apply(spec, **columns).table
+def column(name: str, spec: LayerSpec, /, **columns: Sequence[object]) -> list[Any]:
+    values: list[Any] = apply(spec, **columns).columns[name].to_pylist()
+    return values
 
 
 @given(st.integers(-(2**53), 2**53))
 def test_whole_identifiers_have_no_decimals(number: int) -> None:
     spec = LayerSpec(name="things", class_name="bench", id_field="n")
     same = [number, float(number), str(number), f"{number}.0", f" {number}.00 "]
-    ids = table(spec, n=[*same, None, "", "  "])["source_id"]
-    assert ids.tolist() == [str(number)] * 5 + ["6", "7", "8"]
+    ids = column("source_id", spec, n=[*same, None, "", "  "])
+    assert ids == [str(number)] * 5 + ["6", "7", "8"]
 
 
 def test_unlisted_values_of_class_by_are_left_out_and_noted() -> None:
@@ -95,7 +92,7 @@ def test_unlisted_values_of_class_by_are_left_out_and_noted() -> None:
     by = ClassBy("kind", (("bench", "bench"), ("/stop.*/", "bus_stop")))
     kinds = [*["bin"] * 9, *["box", None] * 2, "bench", "stop 1", "\x1b[31m"]
     layer = apply(LayerSpec(name="things", class_name="", class_by=by), kind=kinds)
-    assert layer.table["class_name"].tolist() == ["bench", "bus_stop"]
+    assert layer.columns["class_name"].to_pylist() == ["bench", "bus_stop"]
     assert (layer.filtered, layer.excluded) == (14, 0)
     values = "'bin' 9, 'box' 2, no value 2, '\\x1b[31m' 1"
     assert layer.notes == (f"left out, unlisted in class_by 'kind': {values}",)
@@ -103,7 +100,7 @@ def test_unlisted_values_of_class_by_are_left_out_and_noted() -> None:
     note = apply(spec, kind=kinds).notes[0]
     assert note.endswith('; write otherwise = "class" to take them as bench')
     spec = replace(spec, class_by=replace(by, otherwise=True))
-    names = table(spec, kind=kinds)["class_name"].tolist()
+    names = column("class_name", spec, kind=kinds)
     assert names == [*["bench"] * 14, "bus_stop", "bench"]
     many = apply(LayerSpec(name="things", class_name="", class_by=by), kind=[*map(str, range(20))])
     assert many.notes[0].endswith("'7' 1, and 12 others")
@@ -112,7 +109,7 @@ def test_unlisted_values_of_class_by_are_left_out_and_noted() -> None:
 def test_values_of_class_by_are_not_comparisons() -> None:
     by = ClassBy("height", (("<2 m", "bench"), ("none", "bus_stop")))
     layer = apply(LayerSpec(name="a", class_name="", class_by=by), height=["<2 m", "none", None])
-    assert layer.table["class_name"].tolist() == ["bench", "bus_stop"]
+    assert layer.columns["class_name"].to_pylist() == ["bench", "bus_stop"]
 
 
 def test_row_is_counted_by_the_first_reason() -> None:
@@ -128,7 +125,7 @@ def test_row_is_counted_by_the_first_reason() -> None:
         state=["gone", "planned", "gone", None, "there", ""],
         depth=[1.0, 0.0, 0.0, 0.5, None, -1.0],
     )
-    assert layer.table.index.tolist() == [5, 6]
+    assert layer.numbers.tolist() == [5, 6]
     assert (layer.filtered, layer.excluded) == (1, 3)
     assert layer.notes == ("left out by the catalogue's not: state 2, depth 1",)
 
@@ -147,8 +144,8 @@ def street(**what: Any) -> LayerSpec:  # noqa: ANN401 - any field of a LayerSpec
 
 
 def half_width(spec: LayerSpec, **row: object) -> float:
-    widths = table(spec, **{name: [value] for name, value in row.items()}).get("half_width")
-    return math.nan if widths is None else float(widths.iloc[0])
+    columns = apply(spec, **{name: [value] for name, value in row.items()}).columns.to_pydict()
+    return float(columns.get("half_width", [math.nan])[0])
 
 
 ODD_WIDTHS = (True, 0, 0.05, -3, math.nan, math.inf, 201, "wide", "", None, "9'")
@@ -206,8 +203,8 @@ def test_every_reader_returns_widths_and_names_of_streets(name: str, file: str) 
 
 
 def test_missing_name_of_a_street_is_empty() -> None:
-    names = table(street(name_field="name"), name=["Rue É", None, " "], highway=[""] * 3)["name"]
-    assert names.tolist() == ["Rue É", "", ""]
+    names = column("name", street(name_field="name"), name=["Rue É", None, " "])
+    assert names == ["Rue É", "", ""]
 
 
 def test_portal_fields_may_have_other_spellings(read_as: Callable[..., RawLayer]) -> None:

@@ -191,13 +191,15 @@ def test_bounds_are_rounded_outwards_to_the_next_float(
 
 def test_hilbert_order_keeps_neighbours_together() -> None:
     points = np.asarray(shapely.points(np.random.default_rng(0).uniform(0, 100, (2_000, 2))))
-    order = hilbert_order(points)
+    order = hilbert_order(shapely.bounds(points))
+    curve = gpd.GeoSeries(points).hilbert_distance()
+    assert order.tolist() == np.argsort(curve.to_numpy(), kind="stable").tolist()
     assert sorted(order.tolist()) == list(range(2_000))
     steps = shapely.distance(points[order][1:], points[order][:-1])
     assert np.median(steps) < 3
     assert np.median(shapely.distance(points[1:], points[:-1])) > 40
     for equal in (5, 0):
-        assert hilbert_order(points[[0] * equal]).tolist() == [*range(equal)]
+        assert hilbert_order(shapely.bounds(points[[0] * equal])).tolist() == [*range(equal)]
 
 
 def test_row_groups_and_rows_are_selected_by_box(tmp_path: Path) -> None:
@@ -211,6 +213,9 @@ def test_row_groups_and_rows_are_selected_by_box(tmp_path: Path) -> None:
         assert groups_meeting(file, (25, 1, 29, 2)) == []
         assert groups_meeting(file, (31, 5, 32, 9)) == []
     assert rows_meeting(table, (24, 4, 30, 9))["row"].to_pylist() == [2, 3]
+    assert rows_meeting(table, (24, 4, 25, 9), (101, 1, 102, 2))["row"].to_pylist() == [2, 10]
+    unknown = pa.table({"bbox": pa.array([None], table["bbox"].type), "row": [12]})
+    assert rows_meeting(unknown, (24, 4, 30, 9)).num_rows == 1
     assert np.concatenate(list(bounds_by_group(tmp_path / "a.parquet"))).tolist() == places.tolist()
 
 

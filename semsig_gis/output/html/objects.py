@@ -158,7 +158,7 @@ def _simple(
     parts, owner = shapely.get_parts(parts[solid], return_index=True)
     # Outlines and courtyards in opposite directions, which the fill rule of a canvas needs.
     rows, parts = rows[owner], shapely.normalize(parts)
-    order = hilbert_order(parts) if len(parts) else slice(None)
+    order = hilbert_order(shapely.bounds(parts))
     return parts[order], rows[order]
 
 
@@ -256,7 +256,7 @@ def objects_map(
 def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]]:
     """Return the objects for the script, by class and along a Hilbert curve, and settings."""
     # Neighbours have small differences of coordinates, which compress well.
-    near = hilbert_order(objects.table.geometry.array)
+    near = hilbert_order(np.column_stack([objects.xy, objects.xy]))
     order = near[np.argsort(objects.codes[near], kind="stable")]
     table = objects.table.iloc[order]
     places, about = mercator(objects.xy[order], objects.crs)

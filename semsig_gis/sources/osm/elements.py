@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
 import shapely
 
 from semsig_gis.core import CatalogError
 from semsig_gis.sources.filters import ANY_VALUE
-from semsig_gis.sources.rows import (
-    WGS84,
-    BadFeatureError,
-    RowRules,
-    Rows,
-    choose_crs,
-    raw_layer,
-)
+from semsig_gis.sources.rows import BadFeatureError, LayerBuilder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -24,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import ElementKind, LayerSpec, Role
     from semsig_gis.sources.rows import Position
 
@@ -153,52 +146,58 @@ class TagIndex:
     def __init__(self, specs: Sequence[LayerSpec]) -> None:
         self._specs = specs
         self._by_tag: dict[tuple[str, str], set[int]] = {}
+        self._used: set[str] = set()
         for number, spec in enumerate(specs):
             for alternative in require_tags(spec):
                 # Every element of this alternative has its first tag, so one tag is enough.
                 key, accepted = alternative[0]
                 for value in accepted:
                     self._by_tag.setdefault((key, value), set()).add(number)
+                self._used.update(key for key, _ in alternative)
+        # Most elements have the same few tags, apart from those that no layer uses.
+        self._find = functools.lru_cache(maxsize=4096)(self._layers)
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Sorted keys; every element of a layer has at least one of them."""
         return tuple(sorted({key for key, _ in self._by_tag}))
 
-    def layers(self, tags: Mapping[str, str]) -> list[int]:
+    def layers(self, tags: Mapping[str, str]) -> tuple[int, ...]:
         """Return the numbers of the layers that an element belongs to, in order."""
+        return self._find(tuple((key, tags[key]) for key in tags if key in self._used))
+
+    def _layers(self, pairs: tuple[tuple[str, str], ...]) -> tuple[int, ...]:
         candidates: set[int] = set()
-        for key, value in tags.items():
+        for key, value in pairs:
             for candidate_value in (value, ANY_VALUE):
                 candidates |= self._by_tag.get((key, candidate_value), set())
-        return [number for number in sorted(candidates) if has_tags(tags, self._specs[number])]
+        tags = dict(pairs)
+        return tuple(number for number in sorted(candidates) if has_tags(tags, self._specs[number]))
 
 
-class ElementLayer:
-    """A layer during the reading of elements that have its tags."""
-
-    def __init__(self, spec: LayerSpec, *, filters: bool, where: str) -> None:
-        self.spec = spec
-        self.rows = Rows()
-        fields = [field for _, field in spec.fields]  # each is the key of a tag
-        where = f"layer {spec.name!r} of {where}"
-        self.rules = RowRules(spec, fields, filters=filters, where=where)
-
-    def add(
-        self, kind: ElementKind, name: str, tags: Mapping[str, str], position: Position | str
-    ) -> bool:
-        """Add an element with its position or an error message; return whether it is accepted."""
-        self.rows.read += 1
-        if not has_shape(kind, tags, self.spec):
-            self.rows.filtered += 1
-            return False
-        text = f"{name} {position}" if isinstance(position, str) else position
-        self.rows.add([tags.get(field) for field in self.rules.fields], name, text)
-        return True
-
-    def raw(self, crs: str | None) -> RawLayer:
-        """Return the layer in WGS 84; another `crs` of the user only causes a note."""
-        system, notes = choose_crs(
-            WGS84, expected=self.spec.crs, requested=crs, where=self.rules.file
+def element_layers(specs: Sequence[LayerSpec], *, filters: bool, where: str) -> list[LayerBuilder]:
+    """Return a builder for each layer; its fields are keys of tags."""
+    return [
+        LayerBuilder(
+            spec,
+            [field for _, field in spec.fields],
+            filters=filters,
+            where=f"layer {spec.name!r} of {where}",
         )
-        return raw_layer(self.rows, self.rules, system, by_file=True, notes=notes)
+        for spec in specs
+    ]
+
+
+def add_element(
+    layer: LayerBuilder,
+    kind: ElementKind,
+    name: str,
+    tags: Mapping[str, str],
+    position: Position | str,
+) -> bool:
+    """Add an element with its position or an error message; return whether it is accepted."""
+    if not has_shape(kind, tags, layer.spec):
+        layer.rows.skip()
+        return False
+    layer.rows.add(tags, name, f"{name} {position}" if isinstance(position, str) else position)
+    return True

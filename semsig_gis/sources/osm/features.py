@@ -8,29 +8,37 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import geopandas as gpd
 import numpy as np
-import pandas as pd
+import pyarrow as pa
 import shapely
 
 from semsig_gis.core import CrsError, InputError
-from semsig_gis.sources import parquet
+from semsig_gis.sources import parquet, vector
 from semsig_gis.sources.catalog import data_folder, load_catalog
 from semsig_gis.sources.filters import as_text
-from semsig_gis.sources.osm.elements import KIND_BY_LETTER, ElementLayer, TagIndex, feature_shape
+from semsig_gis.sources.layer import transformed
+from semsig_gis.sources.osm.elements import (
+    KIND_BY_LETTER,
+    TagIndex,
+    add_element,
+    element_layers,
+    feature_shape,
+)
 from semsig_gis.sources.parquet import read_parquet
 from semsig_gis.sources.probe import probe_file
-from semsig_gis.sources.rows import WGS84, BadFeatureError, built_geometries, parse_crs
-from semsig_gis.sources.vector.file import read_tables, spatial_layers
+from semsig_gis.sources.rows import WGS84, BadFeatureError, built_geometries, parse_crs, plain
 from semsig_gis.storage import parse_toml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    import geopandas as gpd
 
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
@@ -69,7 +77,7 @@ ElementName = tuple["ElementKind | None", str]
 class FeatureTable:
     """Columns of a table and the positions of its rows in WGS 84; `notes` list unreadable rows."""
 
-    columns: Mapping[str, pd.Series[Any]]
+    columns: Mapping[str, Sequence[Any]]
     positions: Sequence[Position | str]
     notes: tuple[str, ...] = ()
 
@@ -157,7 +165,7 @@ def _table_layers(
     tables: Iterable[FeatureTable], specs: Sequence[LayerSpec], *, filters: bool, where: str
 ) -> tuple[RawLayer, ...]:
     """Return the layers of tables of elements, one for each of `specs`."""
-    layers = [ElementLayer(spec, filters=filters, where=where) for spec in specs]
+    layers = element_layers(specs, filters=filters, where=where)
     index, keys = TagIndex(specs), _keys(specs)
     known_names: set[tuple[int, str]] = set()
     notes: list[str] = []
@@ -182,8 +190,8 @@ def _table_layers(
                     continue
                 known_names.add((number, name))
                 shape = _element_shape(position, layers[number].spec)
-                layers[number].add(kind, name or f"row {row + 1}", element_tags, shape)
-    raw = [layer.raw(None) for layer in layers]
+                add_element(layers[number], kind, name or f"row {row + 1}", element_tags, shape)
+    raw = [layer.layer(WGS84, requested=None) for layer in layers]
     # A table rarely contains elements of all layers, so an empty layer is not worth a note. Rows
     # that cannot be read belong to no layer; their notes go to the first one.
     raw = [layer if layer.counts.read else replace(layer, notes=()) for layer in raw]
@@ -218,11 +226,18 @@ def _frame_table(frame: gpd.GeoDataFrame) -> FeatureTable:
     if not frame.columns.is_unique:
         names = frame.columns[frame.columns.duplicated()]
         raise InputError(f"the table has several columns {names[0]!r}; rename or drop them.")
-    geometry = frame.geometry
+    geometry = frame.geometry.to_numpy()
     if not frame.crs.equals(WGS84, ignore_axis_order=True):
-        geometry = geometry.to_crs(WGS84)
-    columns = {str(name): frame[name] for name in frame.columns if name != geometry.name}
-    return FeatureTable(columns, geometry.to_list())
+        geometry = transformed(geometry, frame.crs, WGS84)
+    columns = {
+        str(name): [
+            value if valid else None
+            for value, valid in zip(frame[name].to_list(), frame[name].notna(), strict=True)
+        ]
+        for name in frame.columns
+        if name != frame.geometry.name
+    }
+    return FeatureTable(columns, geometry.tolist())
 
 
 @functools.cache
@@ -242,28 +257,27 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
         yield _frame_table(frame)
         return
     # A file that the probe does not open as a vector file is refused here with its error.
-    layers = probe_file(path).layers or spatial_layers(path)
-    for table in read_tables(
+    layers = probe_file(path).layers or vector.spatial_layers(path)
+    for rows, system, crs_notes in vector.read_tables(
         layers, lambda fields: names_read if has_tag_columns(fields) else (), crs=crs
     ):
-        rows = table.rows
-        values = zip(*rows.values, strict=True) if rows.values else [()] * len(table.fields)
+        arrays = {name: rows.column(name) for name in rows.columns}
         columns = {
-            name: pd.Series(list(column), dtype=object)
-            for name, column in zip(table.fields, values, strict=True)
+            name: [plain(v) for v in array.to_pylist()] if isinstance(array, pa.Array) else array
+            for name, array in arrays.items()
         }
         positions = rows.positions
-        if not table.crs.equals(WGS84, ignore_axis_order=True):
+        if not system.equals(WGS84, ignore_axis_order=True):
             shapes = [None if isinstance(position, str) else position for position in positions]
-            degrees = gpd.GeoSeries(built_geometries(shapes), crs=table.crs).to_crs(WGS84)
+            degrees = transformed(built_geometries(shapes), system, WGS84)
             # Error messages stay in their places.
             pairs = zip(positions, degrees, strict=True)
             positions = [old if isinstance(old, str) else new for old, new in pairs]
-        notes = table.notes
+        notes = list(crs_notes)
         if rows.errors:
             number, text = next(iter(rows.errors.items()))
-            notes += (f"{len(rows.errors):,} rows cannot be read (row {number}: {text})",)
-        yield FeatureTable(columns, positions, notes)
+            notes.append(f"{len(rows.errors):,} rows cannot be read (row {number}: {text})")
+        yield FeatureTable(columns, positions, tuple(notes))
 
 
 def _keys(specs: Sequence[LayerSpec]) -> frozenset[str]:
@@ -272,12 +286,11 @@ def _keys(specs: Sequence[LayerSpec]) -> frozenset[str]:
     return frozenset({*tags, *(field for spec in specs for _, field in spec.fields), TYPE, AREA})
 
 
-def _valid_rows(values: pd.Series[Any] | None) -> Iterator[tuple[int, Any]]:
+def _valid_rows(values: Sequence[Any] | None) -> Iterator[tuple[int, Any]]:
     """Yield the numbers and values of the rows of a column that have a value."""
-    if values is None:
-        return
-    rows = np.flatnonzero(values.notna().to_numpy())
-    yield from zip(rows.tolist(), values.iloc[rows].to_list(), strict=True)
+    for row, value in enumerate(values or ()):
+        if value is not None and not (isinstance(value, float) and math.isnan(value)):
+            yield row, value
 
 
 def _tag_value(value: object) -> str:
@@ -324,9 +337,9 @@ def _geofabrik_tags(name: str, code: str) -> dict[str, str]:
     return {key: name for start, key in keys.items() if code.startswith(start)}
 
 
-def _has_kinds(values: pd.Series[Any]) -> bool:
+def _has_kinds(values: Sequence[Any]) -> bool:
     """Whether all values are node, way or relation, unlike those of the tag `type`."""
-    return set(values.dropna().astype(str).str.lower()) <= set(KIND_BY_LETTER.values())
+    return {str(value).lower() for _, value in _valid_rows(values)} <= set(KIND_BY_LETTER.values())
 
 
 def _as_element(

@@ -21,15 +21,16 @@ from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.compression import check_compression_ratio
 from semsig_gis.sources.osm.elements import (
     KIND_BY_LETTER,
-    ElementLayer,
     TagIndex,
+    add_element,
+    element_layers,
     relation_shape,
     way_shape,
 )
 from semsig_gis.sources.osm.features import FORMATS
 from semsig_gis.sources.osm.merge import age_notes, merge_extracts, read_errors
 from semsig_gis.sources.paths import require_file
-from semsig_gis.sources.rows import BadFeatureError
+from semsig_gis.sources.rows import WGS84, BadFeatureError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
-    from semsig_gis.sources.rows import Position
+    from semsig_gis.sources.rows import LayerBuilder, Position
 
 # Index of pyosmium for the locations of nodes, in a temporary file.
 LOCATION_INDEX = "sparse_file_array"
@@ -49,7 +50,7 @@ NO_LOCATION = (math.nan, math.nan)
 class _Outline(NamedTuple):
     """A way or multipolygon of a layer, before the locations of its nodes are read."""
 
-    layer: ElementLayer
+    layer: LayerBuilder
     row: int  # in the layer
     name: str
     outer: tuple[int, ...]  # ids of the outer ways; for a way, its own id
@@ -57,7 +58,7 @@ class _Outline(NamedTuple):
     is_way: bool
 
     @classmethod
-    def of(cls, layer: ElementLayer, name: str, element: Way | Relation) -> Self:
+    def of(cls, layer: LayerBuilder, name: str, element: Way | Relation) -> Self:
         """Return the outline of an element, the last row of its layer."""
         row = len(layer.rows.positions) - 1
         if isinstance(element, Way):
@@ -107,7 +108,7 @@ def read_layers(
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     files = {path: _file(path) for path in paths}
     where = str(paths[0]) if len(files) == 1 else f"{len(files)} extracts"
-    layers = [ElementLayer(spec, filters=filters, where=where) for spec in specs]
+    layers = element_layers(specs, filters=filters, where=where)
     if not layers:
         return ()
     for spec in specs:
@@ -132,7 +133,7 @@ def read_layers(
         outline.layer.rows.positions[outline.row] = outline.position(lines)
     notes = age_notes(files) if len(files) > 1 else ()
     extent = _extent(files.values())
-    raw = (layer.raw(crs) for layer in layers)
+    raw = (layer.layer(WGS84, requested=crs) for layer in layers)
     return tuple(replace(layer, notes=(*notes, *layer.notes), extent=extent) for layer in raw)
 
 
@@ -167,22 +168,22 @@ def _file(path: Path) -> osmium.io.File:
     return osmium.io.File(str(path.absolute()), kind)
 
 
-def _scan(file: osmium.io.File, layers: Sequence[ElementLayer], index: TagIndex) -> list[_Outline]:
+def _scan(file: osmium.io.File, layers: Sequence[LayerBuilder], index: TagIndex) -> list[_Outline]:
     """Add the elements of a file to their layers; return the ways and multipolygons."""
     outlines = []
     processor = osmium.FileProcessor(file, NODE | WAY | RELATION)
     for element in processor.with_filter(KeyFilter(*index.keys)):
         if not isinstance(element, Node | Way | Relation) or element.deleted:
             continue
-        tags = {tag.k: tag.v for tag in element.tags}
+        tags = dict(element.tags)
         kind = KIND_BY_LETTER[element.type_str()]
         name = f"{kind}/{element.id}"
         for layer in (layers[number] for number in index.layers(tags)):
             if isinstance(element, Node):
                 valid = element.location.valid()
                 position = _lonlat(element.location) if valid else "has no valid position"
-                layer.add(kind, name, tags, position)
-            elif layer.add(kind, name, tags, None):
+                add_element(layer, kind, name, tags, position)
+            elif add_element(layer, kind, name, tags, None):
                 outlines.append(_Outline.of(layer, name, element))
     return outlines
 

@@ -27,13 +27,14 @@ from semsig_gis.sources.http.fetch import (
 )
 from semsig_gis.sources.osm.elements import (
     KIND_BY_LETTER,
-    ElementLayer,
     TagIndex,
+    add_element,
+    element_layers,
     relation_shape,
     require_tags,
     way_shape,
 )
-from semsig_gis.sources.rows import BadFeatureError
+from semsig_gis.sources.rows import WGS84, BadFeatureError
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ def read_layers(
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} tiles"
-    layers = [ElementLayer(spec, filters=filters, where=where) for spec in specs]
+    layers = element_layers(specs, filters=filters, where=where)
     if not layers:
         return ()
     index = TagIndex(specs)
@@ -142,9 +143,9 @@ def read_layers(
                 tags = element["tags"]
                 for layer in (layers[place] for place in index.layers(tags)):
                     position = positions.position(element, layer.spec)
-                    accepted = layer.add(kind, f"{kind}/{number}", tags, position)
+                    accepted = add_element(layer, kind, f"{kind}/{number}", tags, position)
                     centre_counts[layer.spec.name] += accepted and _has_only_centre(element)
-    raw = [layer.raw(crs) for layer in layers]
+    raw = [layer.layer(WGS84, requested=crs) for layer in layers]
     for number, raw_layer in enumerate(raw):
         centres = centre_counts[raw_layer.spec.name]
         if centres and raw_layer.spec.role == "objects":

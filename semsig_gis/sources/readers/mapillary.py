@@ -10,7 +10,7 @@ from semsig_gis.core import SourceError
 from semsig_gis.sources.area import fetch_tiles, tiles_of
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch, host_of
 from semsig_gis.sources.registry import READERS, Source, fetch_by_tiles
-from semsig_gis.sources.rows import WGS84, RowRules, Rows, choose_crs, raw_layer
+from semsig_gis.sources.rows import WGS84, LayerBuilder
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
@@ -45,24 +45,22 @@ def read_layers(
     neither.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
-    where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} files"
+    files = str(paths[0]) if len(paths) == 1 else f"{len(paths)} files"
     features: dict[str, dict[str, Any]] = {}
     for file in paths:
         features.update((str(item.get("id", "")), item) for item in load_features(file))
     layers = []
     for spec in specs:
-        rules = RowRules(spec, FIELDS, filters=filters, where=f"layer {spec.name!r} ({where})")
-        rows = Rows()
+        where = f"layer {spec.name!r} ({files})"
+        builder = LayerBuilder(spec, FIELDS, filters=filters, where=where)
         for name, feature in features.items():
-            rows.read += 1
             try:
                 longitude, latitude = feature["geometry"]["coordinates"][:2]
                 position: Position | str = float(longitude), float(latitude)
             except (KeyError, TypeError, ValueError):
                 position = f"map feature {feature.get('id')} has no position"
-            rows.add([feature.get(field) for field in rules.fields], name, position)
-        system, notes = choose_crs(WGS84, expected=spec.crs, requested=crs, where=rules.file)
-        layers.append(raw_layer(rows, rules, system, by_file=True, notes=notes))
+            builder.rows.add(feature, name, position)
+        layers.append(builder.layer(WGS84, requested=crs))
     return tuple(layers)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
@@ -21,26 +22,26 @@ from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.filters import ANY_VALUE, as_text
 from semsig_gis.sources.http.cache import cache_key, checksum
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, cached_file
-from semsig_gis.sources.osm.elements import ElementLayer, TagIndex
+from semsig_gis.sources.osm.elements import TagIndex, element_layers
 from semsig_gis.sources.registry import READERS, Source, fetch_by_tiles
-from semsig_gis.storage import groups_meeting, parse_json
+from semsig_gis.sources.rows import WGS84
+from semsig_gis.storage import groups_meeting, parse_json, rows_meeting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
-    from shapely.geometry.base import BaseGeometry
 
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
+    from semsig_gis.sources.rows import LayerBuilder
 
     Boxes = Sequence[tuple[float, float, float, float]]
 
 GEOMETRY, BOX, SOURCE_TAGS = "geometry", "bbox", "source_tags"
-SIDES = ("xmin", "ymin", "xmax", "ymax")
 # Part of a path, such as theme=base.
 PARTITION = re.compile(r"(theme|type)=([^/\\]+)")
 # Kinds of OpenStreetMap elements by their type of geometry in Overture.
@@ -50,6 +51,7 @@ KIND_BY_GEOMETRY: dict[str, ElementKind] = {
     "Polygon": "way",
     "MultiPolygon": "relation",
 }
+EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 ROUNDING_DEG = 2e-5  # error of the largest degrees as 32-bit floats
 THREADS = 8  # more than processors, because they mostly wait for the store
 STORE = "s3"
@@ -73,14 +75,14 @@ def read_layers(
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} files"
-    layers = [_FeatureLayer(spec, filters=filters, where=where) for spec in specs]
+    layers = element_layers(specs, filters=filters, where=where)
     for file in paths:
         present = [layer for layer in layers if _may_hold(str(file), layer.spec)]
         if present:
             present_specs = [layer.spec for layer in present]
             for table in _slices(fs.LocalFileSystem(), str(file), present_specs, _boxes(area)):
                 _add_rows(table, present)
-    return tuple(layer.raw(crs) for layer in layers)
+    return tuple(layer.layer(WGS84, requested=crs) for layer in layers)
 
 
 def _may_hold(path: str, spec: LayerSpec) -> bool:
@@ -90,20 +92,7 @@ def _may_hold(path: str, spec: LayerSpec) -> bool:
     return parts.get("theme", theme) == theme and parts.get("type", kind) == kind
 
 
-class _FeatureLayer(ElementLayer):
-    """A layer during the reading of features that have its tags."""
-
-    def add_feature(self, values: Mapping[str, Any], name: str, shape: BaseGeometry | None) -> None:
-        """Add a feature if its type of geometry is one of the layer's ``elements``."""
-        self.rows.read += 1
-        kind = None if shape is None else KIND_BY_GEOMETRY.get(shape.geom_type)
-        if kind not in {*self.spec.elements, None}:
-            self.rows.filtered += 1
-            return
-        self.rows.add([values.get(field) for field in self.rules.fields], name, shape)
-
-
-def _add_rows(table: pa.Table, layers: Sequence[_FeatureLayer]) -> None:
+def _add_rows(table: pa.Table, layers: Sequence[LayerBuilder]) -> None:
     """Add the rows of a table to the layers that they belong to by their tags."""
     index = TagIndex([layer.spec for layer in layers])
     geometry = table.column(GEOMETRY)
@@ -111,34 +100,26 @@ def _add_rows(table: pa.Table, layers: Sequence[_FeatureLayer]) -> None:
     if isinstance(geometry.type, pa.BaseExtensionType):  # a column with the type of GeoArrow
         geometry = geometry.storage
     shapes = shapely.from_wkb(geometry.to_numpy(zero_copy_only=False), on_invalid="ignore")
-    columns = {
-        name: table.column(name).to_pylist()
-        for name in table.column_names
-        if name not in {GEOMETRY, SOURCE_TAGS} and not name.startswith(f"{BOX}.")
-    }
-    source_tags = (
-        table.column(SOURCE_TAGS).to_pylist()
-        if SOURCE_TAGS in table.column_names
-        else [None] * len(table)
-    )
-    names = columns.get("id", [""] * len(table))
-    for number, (row, tags) in enumerate(
-        zip(zip(*columns.values(), strict=True), source_tags, strict=True)
-    ):
-        own = zip(columns, row, strict=True)
-        values = {**dict(tags or ()), **{key: value for key, value in own if value is not None}}
+    own = [n for n in table.column_names if n != GEOMETRY and not n.startswith(f"{BOX}.")]
+    for row, shape in zip(table.select(own).to_pylist(), shapes, strict=True):
+        values = {key: value for key, value in row.items() if value is not None}
+        values = {**dict(values.pop(SOURCE_TAGS, ())), **values}
         texts = {key: as_text(value) for key, value in values.items() if value is not None}
-        for place in index.layers(texts):
-            layers[place].add_feature(values, str(names[number] or ""), shapes[number])
+        kind = None if shape is None else KIND_BY_GEOMETRY.get(shape.geom_type)
+        for layer in (layers[number] for number in index.layers(texts)):
+            if kind in {*layer.spec.elements, None}:
+                layer.rows.add(values, str(row.get("id") or ""), shape)
+            else:
+                layer.rows.skip()
 
 
 # --- The needed parts of a file -------------------------------------------------------------------
 
 
-def _boxes(area: Area | None) -> Boxes | None:
+def _boxes(area: Area | None) -> Boxes:
     """Return the boxes of an area, a little larger, because the boxes in a file are rounded."""
     if area is None:
-        return None
+        return [EVERYWHERE]
     return [
         (west - ROUNDING_DEG, south - ROUNDING_DEG, east + ROUNDING_DEG, north + ROUNDING_DEG)
         for west, south, east, north in area.boxes
@@ -146,7 +127,7 @@ def _boxes(area: Area | None) -> Boxes | None:
 
 
 def _slices(
-    system: fs.FileSystem, path: str, specs: Sequence[LayerSpec], boxes: Boxes | None
+    system: fs.FileSystem, path: str, specs: Sequence[LayerSpec], boxes: Boxes
 ) -> Iterator[pa.Table]:
     """Yield the rows of a file that may be in the layers and boxes, with the needed columns.
 
@@ -155,12 +136,9 @@ def _slices(
     try:
         with system.open_input_file(path) as stream, pq.ParquetFile(stream) as file:
             columns = _columns(file.schema_arrow, specs, where=path)
-            groups = set(range(file.num_row_groups))
-            if boxes is not None:
-                groups = {group for box in boxes for group in groups_meeting(file, box)}
-            for number in sorted(groups):
-                table = file.read_row_group(number, columns=columns).flatten()
-                yield table.filter(pa.array(_may_match(table, specs, boxes)))
+            for number in groups_meeting(file, *boxes):
+                table = rows_meeting(file.read_row_group(number, columns=columns), *boxes).flatten()
+                yield table.filter(pa.array(_may_match(table, specs)))
     except (OSError, pa.ArrowException) as error:
         raise SourceError(
             f"{path} cannot be read as GeoParquet ({_cause(error)}); download it again."
@@ -182,19 +160,8 @@ def _columns(schema: pa.Schema, specs: Iterable[LayerSpec], *, where: str) -> li
     return sorted({"id", GEOMETRY, *key_columns} | (optional & {*schema.names}))
 
 
-def _may_match(
-    table: pa.Table, specs: Iterable[LayerSpec], boxes: Boxes | None
-) -> NDArray[np.bool_]:
-    """Return the mask of the rows that meet a box and may be in a layer.
-
-    All rows of a table without bounds meet a box; tags in `source_tags` are not checked.
-    """
-    inside = np.ones(len(table), bool)
-    if boxes is not None and {f"{BOX}.{side}" for side in SIDES} <= {*table.column_names}:
-        xmin, ymin, xmax, ymax = (table.column(f"{BOX}.{side}").to_numpy() for side in SIDES)
-        inside[:] = False
-        for west, south, east, north in boxes:
-            inside |= (xmin <= east) & (xmax >= west) & (ymin <= north) & (ymax >= south)
+def _may_match(table: pa.Table, specs: Iterable[LayerSpec]) -> NDArray[np.bool_]:
+    """Return the mask of the rows that may be in a layer; tags in `source_tags` are not checked."""
     tagged = np.zeros(len(table), bool)
     for tags in itertools.chain.from_iterable(spec.tags for spec in specs):
         # A row matches one of the alternatives in all its keys.
@@ -209,7 +176,7 @@ def _may_match(
                 )
                 rows &= is_in.to_numpy()
         tagged |= rows
-    return inside & tagged
+    return tagged
 
 
 def _cause(error: BaseException) -> str:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import geopandas as gpd
 import numpy as np
 import shapely
 import shapely.geometry
@@ -18,14 +17,7 @@ from shapely.errors import ShapelyError
 from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import KNOWN_NAMES, SHAPE_NAMES
 from semsig_gis.sources.numbers import decimal
-from semsig_gis.sources.rows import (
-    WGS84,
-    BadFeatureError,
-    RowRules,
-    Rows,
-    choose_crs,
-    raw_layer,
-)
+from semsig_gis.sources.rows import WGS84, BadFeatureError, LayerBuilder
 from semsig_gis.sources.services.table import open_table
 from semsig_gis.sources.vector import file as vector_file
 from semsig_gis.storage import parse_json
@@ -253,18 +245,14 @@ class Download:
         if self.area is None:
             return layer
         # Swap x and y if no row is in the requested area before, and some rows are after it.
-        shapes = layer.table.geometry.to_numpy()
         box = shapely.box(*self.area.bounds)
-        if layer.table.crs != WGS84 or shapely.intersects(shapes, box).any():
+        if layer.crs != WGS84 or shapely.intersects(layer.geometry, box).any():
             return layer
-        new_shapes = shapely.transform(shapes, lambda xy: xy[:, ::-1])
-        if not shapely.intersects(new_shapes, box).any():
+        exchanged = shapely.transform(layer.geometry, lambda xy: xy[:, ::-1])
+        if not shapely.intersects(exchanged, box).any():
             return layer
         note = "the service sends latitude as x and longitude as y; exchanged here"
-        geometry = gpd.GeoSeries(new_shapes, layer.table.index, crs=WGS84)
-        return dataclasses.replace(
-            layer, table=layer.table.set_geometry(geometry), notes=(*layer.notes, note)
-        )
+        return dataclasses.replace(layer, geometry=exchanged, notes=(*layer.notes, note))
 
 
 def read_layers(
@@ -285,11 +273,40 @@ def read_layers(
 def _read_table(
     table: ServiceTable, specs: Sequence[LayerSpec], path: Path, *, filters: bool, crs: str | None
 ) -> tuple[RawLayer, ...]:
-    layers = [_TableLayer(spec, table, path, filters=filters, crs=crs) for spec in specs]
-    for record in table.records([field for layer in layers for field in layer.fields]):
-        for layer in layers:
-            layer.add(record)
-    return tuple(layer.raw() for layer in layers)
+    layers = []
+    for spec in specs:
+        where = f"layer {spec.name!r} ({path})"
+        # The fields of a table without rows are unknown.
+        fields = [field for _, field in spec.fields] if table.empty else table.fields
+        own = settle_fields(spec, fields)
+        builder = LayerBuilder(own, fields, filters=filters, where=where)
+        layers.append((builder, PositionReader(spec, table, where=where)))
+    names = [n for builder, positions in layers for n in (*builder.rules.fields, *positions.fields)]
+    for number, record in enumerate(table.records(names), start=1):
+        for builder, positions in layers:
+            if isinstance(record, str):
+                builder.rows.skip(record)
+                continue
+            try:
+                position: Position | str = positions.position(record)
+            except BadFeatureError as error:
+                position = str(error)
+            builder.rows.add(record.values, str(number), position)
+    notes = table.notes
+    if table.rest:
+        rest = (
+            f"the file is one page of a longer answer, which has {table.rest:,} records more; "
+            "export the whole dataset instead"
+        )
+        notes += (rest,)
+    implicit = table.crs is None
+    raw = (
+        builder.layer(table.crs or WGS84, implicit=implicit, requested=crs, notes=notes)
+        for builder, _ in layers
+    )
+    return tuple(
+        dataclasses.replace(layer, spec=spec) for layer, spec in zip(raw, specs, strict=True)
+    )
 
 
 def _read_vector(path: Path, spec: LayerSpec, *, filters: bool, crs: str | None) -> RawLayer:
@@ -298,51 +315,3 @@ def _read_vector(path: Path, spec: LayerSpec, *, filters: bool, crs: str | None)
     fields = [field for info in infos for field in info.fields]
     layer = vector_file.read_layer(path, settle_fields(spec, fields), filters=filters, crs=crs)
     return dataclasses.replace(layer, spec=spec)
-
-
-class _TableLayer:
-    """A layer during the reading of a table."""
-
-    def __init__(
-        self, spec: LayerSpec, table: ServiceTable, path: Path, *, filters: bool, crs: str | None
-    ) -> None:
-        self._spec = spec
-        where = f"layer {spec.name!r} ({path})"
-        own, implicit = table.crs or WGS84, table.crs is None
-        self._crs, self._notes = choose_crs(
-            own, implicit=implicit, expected=spec.crs, requested=crs, where=where
-        )
-        self._notes = (*table.notes, *self._notes)
-        self._by_file = not implicit
-        if table.rest:
-            rest = (
-                f"the file is one page of a longer answer, which has {table.rest:,} records more; "
-                "export the whole dataset instead"
-            )
-            self._notes += (rest,)
-        # The fields of a table without rows are unknown.
-        fields = [field for _, field in spec.fields] if table.empty else table.fields
-        self._rules = RowRules(settle_fields(spec, fields), fields, filters=filters, where=where)
-        self._positions = PositionReader(spec, table, where=where)
-        self._rows = Rows()
-        self.fields = (*self._rules.fields, *self._positions.fields)
-
-    def add(self, record: ServiceRecord | str) -> None:
-        """Add the next row of the table."""
-        self._rows.read += 1
-        if isinstance(record, str):
-            self._rows.errors[self._rows.read] = record
-            return
-        try:
-            position: Position | str = self._positions.position(record)
-        except BadFeatureError as error:
-            position = str(error)
-        values = [record.values.get(field) for field in self._rules.fields]  # JSON omits nulls
-        self._rows.add(values, str(self._rows.read), position)
-
-    def raw(self) -> RawLayer:
-        """Return the layer after the last row."""
-        layer = raw_layer(
-            self._rows, self._rules, self._crs, by_file=self._by_file, notes=self._notes
-        )
-        return dataclasses.replace(layer, spec=self._spec)

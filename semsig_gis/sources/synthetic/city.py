@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import geopandas as gpd
 import numpy as np
-import pandas as pd
+import pyarrow as pa
+import pyproj
 import shapely
 
 from semsig_gis.core import CLASS_NAME, MOST_SEED, SOURCE_ID, InputError, require_number
@@ -230,8 +230,8 @@ def _streets(spec: CitySpec, network: Network) -> RawLayer:
     edges = np.flatnonzero(~shapely.is_empty(lines))
     numbers = [str(number) for number in edges]
     streets = _layer(spec, "streets", _placed(spec, lines[edges]), numbers)
-    streets.table["half_width"] = network.half_width[edges]
-    return streets
+    table = streets.table.assign(half_width=network.half_width[edges])
+    return RawLayer(spec=streets.spec, counts=streets.counts, table=table)
 
 
 def _square(spec: CitySpec) -> Bounds:
@@ -256,14 +256,6 @@ def _layer(spec: CitySpec, what: str, shapes: NDArray[np.object_], ids: Sequence
     """Return the layer of a class, or of the buildings or streets."""
     role, geometry = SURROUNDINGS.get(what, ("objects", "point"))
     class_name = what if role == "objects" else ""
-    table = gpd.GeoDataFrame(
-        {
-            CLASS_NAME: pd.Series([class_name] * len(ids), dtype="str"),
-            SOURCE_ID: pd.Series(ids, dtype="str"),
-        },
-        geometry=shapes,
-        crs=CRS,
-    )
     return RawLayer(
         spec=LayerSpec(
             name=f"synthetic_{what}",
@@ -274,6 +266,13 @@ def _layer(spec: CitySpec, what: str, shapes: NDArray[np.object_], ids: Sequence
             license="CC0-1.0",
             attribution=f"synthetic city of semsig_gis, seed {spec.seed}: no real place",
         ),
-        table=table,
-        counts=RowCounts(read=len(table)),
+        columns=pa.table(
+            {
+                CLASS_NAME: pa.repeat(pa.scalar(class_name), len(ids)),
+                SOURCE_ID: pa.array(ids, pa.string()),
+            }
+        ),
+        geometry=shapes,
+        crs=pyproj.CRS(CRS),
+        counts=RowCounts(read=len(ids)),
     )

@@ -1,4 +1,7 @@
-"""Read a vector file row by row with fiona, and report the error of each bad row."""
+"""Read a vector file row by row with fiona, and report the error of each bad row.
+
+pyogrio reads whole layers; fiona reads a layer again if a row may be damaged.
+"""
 
 from __future__ import annotations
 
@@ -73,7 +76,7 @@ def _rows(
     count: int,
     records: list[logging.LogRecord],
 ) -> Rows:
-    rows = Rows()
+    rows = Rows.of(fields)
     damage = ""
     features = iter(source)
     failures = 0
@@ -83,8 +86,7 @@ def _rows(
             feature = next(features, None)
         except Exception as error:  # noqa: BLE001 - any error; the other rows are read
             failures += 1
-            rows.read += 1
-            rows.errors[rows.read] = f"cannot be read ({error})"
+            rows.skip(f"cannot be read ({error})")
             continue
         failures = 0
         # Keep the first error that GDAL reports without an exception.
@@ -94,8 +96,6 @@ def _rows(
             damage = next((record.getMessage().rstrip(".") for record in errors), "")
         if feature is None:
             break
-        rows.read += 1
-        properties = feature.properties
         rows.closed += feature.geometry is not None and _has_open_ring(feature.geometry)
         try:
             position = _position(feature.geometry)
@@ -103,7 +103,7 @@ def _rows(
             place: Position | str = (damage or None) if position is None else position
         except BadFeatureError as error:
             place = str(error)
-        rows.add([properties[field] for field in fields], feature.id, place)
+        rows.add(feature.properties, feature.id, place)
     if damage or failures:
         rows.mark_unreadable(count, damage or OUT_OF_REACH)
     return rows

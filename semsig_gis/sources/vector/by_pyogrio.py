@@ -1,9 +1,8 @@
-"""Describe and read layers of vector files with pyogrio, all rows at once."""
+"""Describe layers of vector files with pyogrio, and read all their rows at once, in Arrow."""
 
 from __future__ import annotations
 
 import contextlib
-import datetime as dt
 import math
 import struct
 import threading
@@ -12,13 +11,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 import pyogrio
 import shapely
 from pyogrio.raw import open_arrow, read
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
-from semsig_gis.sources.rows import Rows
+from semsig_gis.sources.rows import Rows, plain, usable_crs
+from semsig_gis.sources.vector.geojson import parse_geojson
 from semsig_gis.sources.vector.member import (
     CONTAINER,
     GEOJSON,
@@ -32,13 +33,16 @@ from semsig_gis.sources.vector.member import (
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
     from semsig_gis.sources.rows import Position
     from semsig_gis.sources.vector.member import Member
 
 GEOMETRY_TYPES = dict(enumerate(("Point", "LineString", "Polygon", "MultiPoint", "MultiLineString",
                         "MultiPolygon"), start=1))  # fmt: skip
 """Geometry types by their codes in well-known binary."""
-POINT = 1
+UNKNOWN = "Unknown"  # GDAL's geometry type of several types
 SHORTEST_RING = 4  # coordinates
 DIMENSION_BITS = 0xE0000000  # the flags of Z, M and SRID
 MOST_STEP_ROWS = 65_536
@@ -53,16 +57,20 @@ pyogrio.set_gdal_config_options({"OGR_FLATGEOBUF_STREAM_BASE_IMPL": True})
 
 @dataclass(frozen=True, slots=True)
 class LayerDescription:
-    """Description of a layer by GDAL: geometry type, fields, CRS (empty if none), rows, bounds.
+    """Description of a layer: geometry type, fields, CRS, number of rows and bounds.
 
-    `bounds` are west, south, east, north in the unit of the CRS, None without a geometry.
+    The `crs` is None if the file states none that is known; that of GeoJSON may be `implicit`.
+    `bounds` are west, south, east, north in the unit of the CRS. Of GeoJSON, `empty` are the
+    numbers of the rows without coordinates; geometry type and bounds may be unknown.
     """
 
     geometry: str
     fields: tuple[str, ...]
-    crs: str
+    crs: CRS | None
     rows: int
-    bounds: tuple[float, ...] | None
+    bounds: tuple[float, ...] | None = None
+    implicit: bool = False
+    empty: frozenset[int] = frozenset()
 
 
 _lock = threading.RLock()
@@ -84,12 +92,44 @@ def _captured_warnings(*, crs: bool = False) -> Iterator[list[warnings.WarningMe
             pyogrio.set_gdal_config_options({CRS_SEARCH: before})
 
 
-def describe(member: Member) -> LayerDescription:
-    """Describe a layer of a file; SourceError if it cannot be opened, or is of another kind."""
+def describe(member: Member, *, bounds: bool = False) -> LayerDescription:
+    """Describe a layer of a file; SourceError if it cannot be opened, or is of another kind.
+
+    For the `bounds` of GeoJSON, GDAL parses the file as well.
+    """
     member.require_sound()
+    geojson = parse_geojson(member) if member.driver == GEOJSON else None
+    if geojson is not None and geojson.fields is not None and not bounds:
+        return LayerDescription(
+            UNKNOWN, geojson.fields, geojson.crs, geojson.rows,
+            implicit=geojson.implicit, empty=geojson.empty,
+        )  # fmt: skip
+    info = _info(member)
+    if info["driver"] != member.driver:
+        raise not_of_its_kind(member)
+    text = info["crs"] or ""
+    crs = usable_crs(text)
+    # The search by GDAL finds the code of more systems.
+    if member.driver == SHAPEFILE and text and (crs is None or not crs.srs.startswith("EPSG:")):
+        crs = usable_crs(_info(member, crs=True)["crs"] or "")
+    return LayerDescription(
+        geometry=info["geometry_type"] or NO_GEOMETRY,
+        fields=tuple(info["fields"]),
+        crs=crs if geojson is None else geojson.crs,
+        rows=info["features"],
+        bounds=info["total_bounds"],
+        implicit=geojson is not None and geojson.implicit,
+        # Rows cannot be assigned if GDAL counts differently.
+        empty=geojson.empty
+        if geojson is not None and geojson.rows == info["features"]
+        else frozenset(range(1, info["features"] + 1)),
+    )
+
+
+def _info(member: Member, *, crs: bool = False) -> dict[str, Any]:
     try:
-        with _captured_warnings(crs=True):
-            info = pyogrio.read_info(
+        with _captured_warnings(crs=crs):
+            info: dict[str, Any] = pyogrio.read_info(
                 member.address,
                 layer=member.layer,
                 force_feature_count=True,
@@ -97,15 +137,7 @@ def describe(member: Member) -> LayerDescription:
             )
     except Exception as error:
         raise unreadable(member, error) from error
-    if info["driver"] != member.driver:
-        raise not_of_its_kind(member)
-    return LayerDescription(
-        geometry=info["geometry_type"] or NO_GEOMETRY,
-        fields=tuple(info["fields"]),
-        crs=info["crs"] or "",
-        rows=info["features"],
-        bounds=info["total_bounds"],
-    )
+    return info
 
 
 def layer_names(member: Member) -> list[str]:
@@ -127,24 +159,24 @@ def read_whole(member: Member, fields: Sequence[str], count: int) -> Rows | None
     GDAL returns a missing geometry also for a damaged one, without a distinction.
     """
     if count == 0:
-        return Rows()
+        return Rows.of(fields)
     try:
         with _captured_warnings() as captured:
-            names, values, shapes = _read(member, fields, 0, count)
-        positions = _positions(shapes)
+            names, columns, shapes = _read(member, fields, 0, count)
+        geometry, nowhere = _geometries(shapes.to_numpy(zero_copy_only=False))
     except Exception:  # noqa: BLE001 - any error; the rows are read one by one then
         return None
     # A warning, a missing geometry or a point of NaN may be damage.
-    if captured or (member.driver != GEOJSON and not all(shapes)):
+    if captured or (member.driver != GEOJSON and shapes.null_count):
         return None
-    if member.driver != CONTAINER and any(map(_is_nowhere, positions)):
+    if member.driver != CONTAINER and nowhere:
         return None
     return Rows(
+        columns,
         read=count,
         numbers=list(range(1, count + 1)),
         names=names,
-        values=values,
-        positions=[shapely.Point() if _is_nowhere(place) else place for place in positions],
+        positions=geometry.tolist(),
     )
 
 
@@ -153,7 +185,7 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
 
     Rows are read in blocks. A block that fails is divided until a single row fails.
     """
-    rows = Rows()
+    rows = Rows.of(fields)
     undecoded: list[str] = []
     null_rows: set[int] | None = None  # of a shapefile, which states them
     if member.driver == SHAPEFILE:
@@ -167,22 +199,22 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
         step = min(step, count - rows.read)
         try:
             with _captured_warnings():
-                names, values, shapes = _read(member, fields, rows.read, step, undecoded=undecoded)
+                names, columns, shapes = _read(member, fields, rows.read, step, undecoded=undecoded)
         except Exception as error:  # noqa: BLE001 - any error; the other rows are read
             if step > 1:
                 step = max(1, step // 8)
                 continue
-            rows.read += 1
-            rows.errors[rows.read] = str(error).rstrip(".")
+            rows.skip(str(error).rstrip("."))
             failures += 1
             if failures == MOST_FAILURES:
                 rows.mark_unreadable(count, OUT_OF_REACH)
             continue
-        for name, row, shape in zip(names, values, shapes, strict=True):
-            rows.read += 1
-            place = _place(rows, shape, null=null_rows is None or rows.read in null_rows)
-            empty = member.driver == CONTAINER and _is_nowhere(place)
-            rows.add(row, name, shapely.Point() if empty else place)
+        lists = {field: column.to_pylist() for field, column in columns.items()}
+        for row, (name, shape) in enumerate(zip(names, shapes.to_pylist(), strict=True)):
+            values = {field: column[row] for field, column in lists.items()}
+            null = null_rows is None or rows.read + 1 in null_rows
+            place = _place(rows, shape, null=null, keep=member.driver != CONTAINER)
+            rows.add(values, name, place)
         # After a success, try larger blocks again.
         step, failures = min(8 * step, MOST_STEP_ROWS), 0
     return rows, (NOT_UTF8,) if undecoded else ()
@@ -192,11 +224,13 @@ def first_rows_of(member: Member, fields: Sequence[str], count: int) -> Iterator
     """Yield the values of the first readable rows of a layer."""
     try:
         with _captured_warnings():
-            values = _read(member, fields, 0, count)[1]
+            arrays = _read(member, fields, 0, count)[1]
+        columns = {field: column.to_pylist() for field, column in arrays.items()}
     except Exception:  # noqa: BLE001 - any error; the readable rows are enough here
-        values = read_each(member, fields, count)[0].values
-    for value in values:
-        yield dict(zip(fields, value, strict=True))
+        rows = read_each(member, fields, count)[0]
+        columns = {field: rows.column(field) for field in fields}
+    for values in zip(*columns.values(), strict=True):
+        yield {field: plain(value) for field, value in zip(fields, values, strict=True)}
 
 
 def _read(
@@ -207,45 +241,37 @@ def _read(
     *,
     undecoded: list[str] | None = None,
     encoding: str | None = None,
-) -> tuple[list[str], list[Sequence[Any]], list[bytes]]:
+) -> tuple[list[str], dict[str, pa.Array], pa.Array]:
     """Return names, values and well-known binary of `size` rows; raise if a row cannot be read.
 
     Text that is not UTF-8 raises; with a list `undecoded` it becomes None and its field is added to
-    the list. A shapefile without a stated encoding is read as Latin-1 then, as fiona does.
+    the list. A shapefile without a stated encoding is read as Latin-1, as fiona does.
     """
     options: dict[str, Any] = {"layer": member.layer, "columns": list(fields), "encoding": encoding}
     options |= {"skip_features": start}
     with open_arrow(
         member.address, return_fids=True, batch_size=size, use_pyarrow=True, **options
-    ) as (_, reader):
-        table: Any = next(reader, ())
-    if len(table) != size:  # Arrow stops without a message; the other reader raises the error
+    ) as (meta, reader):
+        batch: Any = next(reader, ()) if encoding or meta["encoding"] != LATIN else None
+    if batch is None:
+        return _read(member, fields, start, size, undecoded=undecoded, encoding=LATIN)
+    if len(batch) != size:  # Arrow stops without a message; the other reader raises the error
         read(member.address, max_features=size, **options)
         raise ValueError("cannot be read")
-    columns = []
-    for field in fields:
+    # By number, because the column of row numbers, the first one, may have the name of a field. The
+    # last one is the geometry; in a table without geometry nobody uses it.
+    arrays = dict(zip(meta["fields"].tolist(), batch.columns[1:], strict=False))
+    columns = {field: arrays[field] for field in fields}
+    for field, column in columns.items():
         try:
-            column = table.column(field)
-            columns.append([_plain(value) for value in column.to_pylist()])
-        except (KeyError, UnicodeDecodeError) as error:
-            info = {} if encoding else pyogrio.read_info(member.address, layer=member.layer)
-            if info.get("encoding") == LATIN:
-                return _read(member, fields, start, size, encoding=LATIN)
-            if undecoded is None or isinstance(error, KeyError):
+            column.validate(full=True)
+        except pa.ArrowInvalid:
+            if undecoded is None:
                 raise
             undecoded.append(field)
-            columns.append([_decoded(value) for value in column.cast("binary").to_pylist()])
-    names = [str(number) for number in table.column(0).to_pylist()]
-    rows: list[Sequence[Any]] = [*zip(*columns, strict=True)] if columns else [()] * size
-    # The last column is the geometry; in a table without geometry nobody uses it.
-    return names, rows, table.column(table.num_columns - 1).to_pylist()
-
-
-def _plain(value: object) -> object:
-    """Return dates and times as text in ISO 8601 without a time zone, others unchanged."""
-    if isinstance(value, dt.datetime):
-        return value.replace(tzinfo=None).isoformat()
-    return value.isoformat() if isinstance(value, dt.date | dt.time) else value
+            texts = [_decoded(value) for value in column.cast("binary").to_pylist()]
+            columns[field] = pa.array(texts, pa.string())
+    return list(map(str, batch.column(0).to_pylist())), columns, batch.columns[-1]
 
 
 def _decoded(value: bytes | None) -> str | None:
@@ -255,49 +281,39 @@ def _decoded(value: bytes | None) -> str | None:
         return None
 
 
-def _positions(shapes: Sequence[bytes]) -> list[Position]:
-    """Return the positions of well-known binary; GEOSException if a geometry is not valid."""
-    positions: list[Position] = [_point(shape) for shape in shapes]
-    others = [row for row, shape in enumerate(shapes) if shape and positions[row] is None]
-    with np.errstate(invalid="ignore"):  # NaN is checked later for all geometries at once
-        built = shapely.force_2d(shapely.from_wkb([shapes[row] for row in others]))
-    for row, geometry in zip(others, built, strict=True):
-        positions[row] = geometry
-    return positions
+def _geometries(shapes: Sequence[bytes]) -> tuple[NDArray[np.object_], list[int]]:
+    """Return the geometries of well-known binary, and the rows of points with two NaN.
 
-
-def _point(shape: bytes) -> Position:
-    """Return the coordinates of a point, else None.
-
-    Shapely is not used, because it returns a point with x = NaN as empty.
+    A point with two NaN becomes empty. GEOSException if a geometry is not valid.
     """
-    if not shape or _kind(shape) != POINT:
-        return None
-    x, y = struct.unpack_from("<2d" if shape[0] else ">2d", shape, 5)
-    return x, y
+    with np.errstate(invalid="ignore"):  # NaN is checked later for all geometries at once
+        built = shapely.force_2d(np.array(shapely.from_wkb(shapes), dtype=object))
+    nowhere = []
+    # Shapely returns a point with x = NaN as empty.
+    is_point = shapely.get_type_id(built) == shapely.GeometryType.POINT
+    for row in np.flatnonzero(is_point & shapely.is_empty(built)).tolist():
+        x, y = struct.unpack_from("<2d" if shapes[row][0] else ">2d", shapes[row], 5)
+        built[row] = shapely.points(x, y)
+        if math.isnan(x) and math.isnan(y):
+            built[row] = shapely.Point()
+            nowhere.append(row)
+    return built, nowhere
 
 
-def _is_nowhere(position: Position | str) -> bool:
-    """Whether a point has NaN coordinates: in a GeoPackage it is empty, else damaged."""
-    return isinstance(position, tuple) and math.isnan(position[0]) and math.isnan(position[1])
-
-
-def _kind(shape: bytes) -> int:
-    (code,) = struct.unpack_from("<I" if shape[0] else ">I", shape, 1)
-    return int(code & ~DIMENSION_BITS) % 1000
-
-
-def _place(rows: Rows, shape: bytes, *, null: bool) -> Position | str:
-    """Return the position of a row, or the text of its error."""
+def _place(rows: Rows, shape: bytes, *, null: bool, keep: bool) -> Position | str:
+    """Return the position of a row, or the text of its error; with `keep`, a point may be NaN."""
     if not shape:
         return None if null else "its geometry is damaged"
     try:
-        return _positions([shape])[0]
+        (geometry,), nowhere = _geometries([shape])
     except shapely.errors.GEOSException as error:
         with np.errstate(invalid="ignore"):
             closed = shapely.from_wkb(shape, on_invalid="fix")
         rings = shapely.get_rings(shapely.get_parts(closed))
         if not len(rings) or (shapely.get_num_coordinates(rings) < SHORTEST_RING).any():
-            return f"its {GEOMETRY_TYPES.get(_kind(shape), 'geometry')} is not valid ({error})"
+            (code,) = struct.unpack_from("<I" if shape[0] else ">I", shape, 1)
+            kind = GEOMETRY_TYPES.get(int(code & ~DIMENSION_BITS) % 1000, "geometry")
+            return f"its {kind} is not valid ({error})"
         rows.closed += 1
         return shapely.force_2d(closed)
+    return (math.nan, math.nan) if nowhere and keep else geometry

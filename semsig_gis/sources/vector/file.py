@@ -1,13 +1,12 @@
 """Read vector files, each suffix with one driver of GDAL; count and report bad rows.
 
-pyogrio reads a layer as a whole. If a row may be damaged, fiona reads the layer again row by row
-and reports the error of each row; without fiona, pyogrio does it.
+pyogrio reads a layer as a whole, in Arrow. If a row may be damaged, fiona reads the layer again row
+by row and reports the error of each row; without fiona, pyogrio does it.
 """
 
 from __future__ import annotations
 
 import itertools
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,18 +15,10 @@ import numpy as np
 
 from semsig_gis.core import SourceError, UnknownNameError, crs_label, nearest_name
 from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
-from semsig_gis.sources.rows import (
-    WGS84,
-    RowRules,
-    choose_crs,
-    fits_the_globe,
-    raw_layer,
-    usable_crs,
-)
+from semsig_gis.sources.rows import LayerBuilder, choose_crs, fits_the_globe
 from semsig_gis.sources.vector import by_pyogrio
 from semsig_gis.sources.vector.by_pyogrio import describe, first_rows_of, layer_names, read_whole
 from semsig_gis.sources.vector.member import CONTAINER, CSV, GEOJSON, Member, members, unreadable
-from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -39,8 +30,6 @@ if TYPE_CHECKING:
     from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Rows
     from semsig_gis.sources.vector.by_pyogrio import LayerDescription
-
-WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,20 +107,9 @@ def read_layer(
     layer = describe(member)
     if layer.geometry == NO_GEOMETRY:
         raise SourceError(f"{where} has no geometry; give the layer that contains the positions.")
-    rules = RowRules(spec, layer.fields, filters=filters, where=where)
-    table = _read_member(member, layer, rules.fields, expected=spec.crs, requested=crs, where=where)
-    return raw_layer(table.rows, rules, table.crs, by_file=table.by_file, notes=table.notes)
-
-
-@dataclass(frozen=True, slots=True)
-class TableRows:
-    """Rows of a layer with the values of some `fields`, and the CRS of their positions."""
-
-    fields: tuple[str, ...]
-    rows: Rows
-    crs: CRS
-    by_file: bool
-    notes: tuple[str, ...]
+    builder = LayerBuilder(spec, layer.fields, filters=filters, where=where)
+    builder.rows, notes = _read_rows(member, layer, builder.rules.fields)
+    return builder.layer(layer.crs, implicit=layer.implicit, requested=crs, notes=notes)
 
 
 def read_tables(
@@ -139,12 +117,23 @@ def read_tables(
     choose: Callable[[Sequence[str]], Collection[str]],
     *,
     crs: str | None = None,
-) -> Iterator[TableRows]:
-    """Yield each layer with the fields that `choose` selects; skip the layer if there are none."""
+) -> Iterator[tuple[Rows, CRS, tuple[str, ...]]]:
+    """Yield rows with the fields that `choose` selects, CRS and notes of each layer.
+
+    Layers without such a field are skipped.
+    """
     for member, layer in layers:
         if names := choose(layer.fields):
             fields = tuple(field for field in layer.fields if field in names)
-            yield _read_member(member, layer, fields, requested=crs, where=str(member))
+            system, notes = choose_crs(
+                layer.crs,
+                implicit=layer.implicit,
+                expected=None,
+                requested=crs,
+                where=str(member),
+            )
+            rows, more = _read_rows(member, layer, fields)
+            yield rows, system, (*notes, *more)
 
 
 def spatial_layers(path: Path) -> tuple[tuple[Member, LayerDescription], ...]:
@@ -160,21 +149,12 @@ def spatial_layers(path: Path) -> tuple[tuple[Member, LayerDescription], ...]:
     return tuple(item for item in described if item[1].geometry != NO_GEOMETRY)
 
 
-def _read_member(
-    member: Member,
-    layer: LayerDescription,
-    fields: tuple[str, ...],
-    *,
-    expected: str | None = None,
-    requested: str | None,
-    where: str,
-) -> TableRows:
-    """Read a layer; its CRS is that of the file, or the `requested` one, or the `expected` one."""
-    own, implicit = _own_crs(member, layer)
-    system, notes = choose_crs(
-        own, implicit=implicit, expected=expected, requested=requested, where=where
-    )
+def _read_rows(
+    member: Member, layer: LayerDescription, fields: tuple[str, ...]
+) -> tuple[Rows, tuple[str, ...]]:
+    """Read the rows of a layer, and notes on them."""
     rows = read_whole(member, fields, layer.rows)
+    notes: tuple[str, ...] = ()
     if rows is None:
         try:
             # fiona takes 190 ms to import, and is needed only for damaged files.
@@ -183,11 +163,14 @@ def _read_member(
             if error.name != "fiona":
                 raise
             read_each = by_pyogrio.read_each
-        rows, more = read_each(member, fields, layer.rows)
-        notes += more
-    if member.driver == GEOJSON:
-        _mark_invalid(rows, member)
-    return TableRows(fields, rows, system, own is not None and not implicit, notes)
+        rows, notes = read_each(member, fields, layer.rows)
+    # A geometry of GeoJSON that is not null but cannot be read; GDAL may count differently, so that
+    # rows cannot be assigned.
+    if member.driver == GEOJSON and rows.read == layer.rows:
+        for row, position in enumerate(rows.positions):
+            if position is None and rows.numbers[row] not in layer.empty:
+                rows.positions[row] = "its geometry is not valid GeoJSON"
+    return rows, notes
 
 
 def read_layers(
@@ -264,55 +247,9 @@ def _describe(member: Member) -> LayerInfo:
         rows, geometry = table.survey()
         crs, fields = table.crs, table.names
     else:
-        layer = describe(member)
-        rows, geometry, fields = layer.rows, layer.geometry, layer.fields
-        crs, implicit = _own_crs(member, layer)
-        if implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
+        layer = describe(member, bounds=True)
+        rows, geometry, crs, fields = layer.rows, layer.geometry, layer.crs, layer.fields
+        if layer.implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
             crs = None
     label = None if crs is None else crs_label(crs)
     return LayerInfo(str(member.layer), geometry, label, rows, fields)
-
-
-def _own_crs(member: Member, layer: LayerDescription) -> tuple[CRS | None, bool]:
-    """Return the CRS of a layer, and whether it is only the default of GeoJSON."""
-    own = usable_crs(layer.crs)
-    if member.driver == GEOJSON:
-        document = _geojson(member)
-        if "crs" not in document:
-            return WGS84, True
-        if own == WGS84 and not WGS84_NAMES.search(str(document["crs"])):
-            return None, False  # GDAL reads an unknown CRS as WGS 84
-    return own, False
-
-
-def _geojson(member: Member) -> dict[str, Any]:
-    """Parse a GeoJSON file; SourceError if it is not valid JSON, which GDAL may accept."""
-    try:
-        with member.open() as stream:
-            document = parse_json(stream.read().decode("utf-8-sig", errors="replace"))
-    except (OSError, ValueError) as error:
-        raise unreadable(member, error) from error
-    return document if isinstance(document, dict) else {}
-
-
-def _mark_invalid(rows: Rows, member: Member) -> None:
-    """Mark the rows of a GeoJSON file with a geometry that is not null but cannot be read."""
-    null = [row for row, position in enumerate(rows.positions) if position is None]
-    if not null:
-        return
-    document = _geojson(member)
-    listed = document.get("features", [document])
-    features = [item for item in listed if isinstance(item, dict) and item.get("type") == "Feature"]
-    if len(features) != rows.read:
-        return  # GDAL counts differently, so that rows cannot be assigned
-    for row in null:
-        geometry = features[rows.numbers[row] - 1].get("geometry")
-        empty = geometry is None
-        if isinstance(geometry, dict):
-            empty = _is_blank(geometry.get("coordinates", geometry.get("geometries")))
-        if not empty:
-            rows.positions[row] = "its geometry is not valid GeoJSON"
-
-
-def _is_blank(parts: object) -> bool:
-    return isinstance(parts, list) and all(_is_blank(part) for part in parts)
