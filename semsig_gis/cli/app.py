@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+import semsig_gis.cli.serve  # noqa: F401 - its command needs a package above `commands`
 from semsig_gis import __version__
 from semsig_gis.cli.console import REPORTER, print_json, print_table, remark, say, talk
 from semsig_gis.commands import (
@@ -83,8 +84,6 @@ class _Commands(Mapping[str, Any]):
     """The commands as typer's, made when they are looked up."""
 
     def __init__(self) -> None:
-        import semsig_gis.cli.serve  # noqa: F401 - a command above `commands`
-
         self.parsed: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - of typer

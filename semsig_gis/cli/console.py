@@ -19,7 +19,7 @@ import typer
 from semsig_gis.core import visible, visible_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterator
 
     from semsig_gis.core import Table
 
@@ -66,8 +66,6 @@ _AMOUNT = r"[-+±]?(?:\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?|infinite)(?: ?(?:°|%|m|k
 NUMBER = re.compile(rf"{_AMOUNT}(?:(?:-| to ){_AMOUNT})?")
 """A number in a table with its unit, or the two ends of an interval."""
 
-LARGEST_COUNT = 10**9  # larger whole numbers are identifiers and get no thousands separators
-
 
 def say(text: object, *, err: bool = False, end: str = "\n") -> None:
     """Print text on standard output or standard error, with escape sequences made visible.
@@ -108,38 +106,34 @@ def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 -
     say(text)
 
 
-def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
-    """Print a table on standard output; markup and escape sequences in it have no effect.
+def print_table(table: Table) -> None:
+    """Print a table with its note; markup and escape sequences in it have no effect.
 
-    Whole numbers get thousands separators. Columns with only numbers are right-aligned.
+    Columns with only numbers are right-aligned.
     """
+    from rich import table as parts
     from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(visible(title)), title_justify="left")
-    cells = [[_cell_text(cell) for cell in row] for row in rows]
+    grid = parts.Table(title=Text(visible(table.title)), title_justify="left")
     # Escape all cells in one call, which is faster.
-    shown = iter(visible_lines(text for row in cells for text in row))
-    texts = [[next(shown) for _ in row] for row in cells]
-    for number, name in enumerate(header):
+    shown = iter(visible_lines(text for row in table.rows for text in row))
+    texts = [[next(shown) for _ in row] for row in table.rows]
+    for number, name in enumerate(table.columns):
         column = [row[number] for row in texts if number < len(row) and row[number]]
         right = bool(column) and all(map(NUMBER.fullmatch, column))
-        table.add_column(Text(visible(name)), overflow="fold", justify="right" if right else "left")
+        grid.add_column(Text(visible(name)), overflow="fold", justify="right" if right else "left")
     for row in texts:
-        table.add_row(*map(Text, row))
+        grid.add_row(*map(Text, row))
     console = Console(file=sys.stdout)
     if not console.is_terminal:
         # A file or a pipe has no width; make the table as wide as it needs.
         wide = Console(file=sys.stdout, width=10_000)
-        width = max(wide.measure(table).maximum, wide.measure(title).maximum)
+        width = max(wide.measure(grid).maximum, wide.measure(table.title).maximum)
         console = Console(file=sys.stdout, width=width)
-    console.print(table)
-
-
-def _cell_text(cell: object) -> str:
-    counts = isinstance(cell, int) and abs(cell) < LARGEST_COUNT
-    return f"{cell:,}" if counts else str(cell)
+    console.print(grid)
+    if table.note:
+        say(table.note)
 
 
 @contextlib.contextmanager
@@ -212,13 +206,6 @@ def _progress_lines(label: str) -> Callable[[int, int], None]:
 
     advance(0, 1)
     return advance
-
-
-def print_table(table: Table) -> None:
-    """Print a table with its note."""
-    print_rows(table.title, table.columns, table.rows)
-    if table.note:
-        say(table.note)
 
 
 class _Console:

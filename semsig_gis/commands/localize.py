@@ -82,7 +82,7 @@ class Localize(SearchOptions, QueryOptions):
     paper: Paper = False
     top: Top = 10
     explain: Explain = False
-    map_: Annotated[
+    map: Annotated[
         Path | None, Option("Map to write (.html).", title="Map page", writes=".html")
     ] = None
     out: Annotated[
@@ -162,7 +162,7 @@ class Localize(SearchOptions, QueryOptions):
 
     def _check(self) -> None:
         """Raise InputError for options that exclude each other."""
-        single = ("types", "bearings", "ranges", "fov", "look", "sectors", "map_", "out")
+        single = ("types", "bearings", "ranges", "fov", "look", "sectors", "map", "out")
         others = [f"--{name.strip('_')}" for name in single if getattr(self, name) is not None]
         others = ([] if self.seen is None else [repr(self.seen)]) + others
         if self.queries is not None and others:
@@ -187,7 +187,7 @@ class Localize(SearchOptions, QueryOptions):
 
     def _require_one_city(self) -> None:
         """Raise InputError for options that need a single database."""
-        names = (*("queries", "explain", "map_", "out"), *PLACES)
+        names = (*("queries", "explain", "map", "out"), *PLACES)
         single = [f"--{name.strip('_')}" for name in names if getattr(self, name)]
         if single or self.ranking != LIKELIHOOD:
             raise InputError(
@@ -352,7 +352,7 @@ class Localize(SearchOptions, QueryOptions):
         with reporter.progress("answering"):
             answer = locator.locate(query)
         notes: list[str] = []
-        if self.map_ is not None:
+        if self.map is not None:
             from semsig_gis.output import localization_map, location_map, save_map
 
             with reporter.progress("drawing the map"):
@@ -361,7 +361,7 @@ class Localize(SearchOptions, QueryOptions):
                 else:
                     map_ = localization_map(answer, city.database)
                 draw_ground(map_, city)
-                notes = online_notes(save_map(map_, self.map_))
+                notes = online_notes(save_map(map_, self.map))
         regions = None if self.out is None else self._write(self.out, city, answer, locator)
 
         def values() -> dict[str, Any]:
@@ -387,8 +387,8 @@ class Localize(SearchOptions, QueryOptions):
         from semsig_gis.output import answer_tables
 
         yield from answer_tables(answer)
-        if self.map_ is not None:
-            yield f"map: {self.map_}"
+        if self.map is not None:
+            yield f"map: {self.map}"
         if self._writes_chances:
             yield f"chances: {self.out}"
         elif regions is not None:

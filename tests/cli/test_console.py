@@ -17,6 +17,7 @@ from sentences import sentence
 
 from semsig_gis.cli import console
 from semsig_gis.cli.console import VARIABLE, progress_line
+from semsig_gis.core import Table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 def test_rows_are_printed_without_markup_or_folding(capsys: pytest.CaptureFixture[str]) -> None:
     rows = [("[red]a[/red]", 1234567, 7652000627500), ("x" * 300, -1, 0)]
-    console.print_rows("[b]title[/b]", ("name", "count", "id"), rows)
+    console.print_table(Table.of("[b]title[/b]", ("name", "count", "id"), rows))
     out = capsys.readouterr().out
     # A pipe has no width, so nothing is folded.
     for text in ("[b]title[/b]", "[red]a[/red]", "1,234,567", " 7652000627500 ", "x" * 300):
@@ -46,7 +47,7 @@ def test_columns_of_numbers_are_right_aligned(capsys: pytest.CaptureFixture[str]
         ("b", 12345, "12.5 %", "0.0979 to 0.1558", "three", ""),
         ("c", -1, "100 %", "infinite", "", ""),
     ]
-    console.print_rows("title", header, rows)
+    console.print_table(Table.of("title", header, rows))
     first = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("│ a"))
     cells = [cell[1:-1] for cell in first.split("│")[1:-1]]
     assert cells == ["a   ", "     7", " 0.5 %", f"{'1-20':>16}", "3    ", "    "]
@@ -104,7 +105,7 @@ def test_shell_completion(
 def test_escape_sequences_are_made_visible(capsys: pytest.CaptureFixture[str]) -> None:
     console.remark(f"{HOSTILE}\nsemsig: all is well")
     console.say(HOSTILE)
-    console.print_rows(HOSTILE, (HOSTILE,), [(HOSTILE,), ("two\nlines",)])
+    console.print_table(Table.of(HOSTILE, (HOSTILE,), [(HOSTILE,), ("two\nlines",)]))
     out, err = capsys.readouterr()
     shown = "a\\u001b[2J\\u001b]0;title\\u0007\\u009b31m\\u202eb\\u000d\\ud83d"
     assert err == f"semsig: {shown}\\u000asemsig: all is well\n"
