@@ -101,11 +101,12 @@ def elements(rows: Rows) -> list[tuple[int, float, float, dict[str, str]]]:
 def write_extract(path: Path, rows: Rows) -> None:
     """Write an extract of OpenStreetMap, packed as its suffix says."""
     plain = write_osm(path.with_suffix(".xml"), *(node(*element) for element in elements(rows)))
-    if path.suffix == ".pbf":
-        path.unlink(missing_ok=True)
-        with osmium.SimpleWriter(str(path)) as writer:
+    if path.suffix.lower() == ".pbf":
+        packed = path.with_name("packed.osm.pbf")
+        with osmium.SimpleWriter(str(packed)) as writer:
             for element in osmium.FileProcessor(str(plain), osmium.osm.NODE):
                 writer.add(element)
+        packed.replace(path)
         return
     content = plain.read_bytes()
     if path.suffix == ".gz":
@@ -187,7 +188,9 @@ KINDS = {
     "OSM": Case("osm_file", "osm", write_extract, TAGGED, DAMAGED),
     "OSM, gzip": Case("osm_file", "osm.gz", write_extract, TAGGED, DAMAGED),
     "OSM, bzip2": Case("osm_file", "osm.bz2", write_extract, TAGGED, DAMAGED),
-    "OSM, pbf": Case("osm_file", "osm.pbf", write_extract, TAGGED, DAMAGED),
+    "OSM, mixed case": Case("osm_file", "Osm.PBF", write_extract, TAGGED),
+    "OSM, upper case": Case("osm_file", "OSM", write_extract, TAGGED),
+    "OSM, pbf": Case("osm_file", "pbf", write_extract, TAGGED, DAMAGED),
     "Overpass": Case("overpass", "json", write_overpass, TAGGED, NO_OVERPASS,
                      "cannot be read (No such file", "cannot be read (Is a directory"),
     "table of OSM": Case("osm_features", "geojson", write_tagged, TAGGED, "cannot be read"),
