@@ -10,15 +10,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from semsig_gis.core import Registry, installed_readers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping
 
     from semsig_gis.sources.layer import RawLayer
-    from semsig_gis.sources.layer_spec import LayerSpec
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,16 +53,8 @@ READERS: Registry[Source] = Registry(
 
 def fetch_by_tiles(
     fetch_layers: Callable[..., list[Path]], read: Callable[..., tuple[RawLayer, ...]]
-) -> Callable[..., Iterator[tuple[RawLayer, str]]]:
+) -> Callable[..., list[tuple[RawLayer, str]]]:
     """Return the `Source.fetch` of a service that sends an area in tiles, each a file."""
-
-    def fetch(
-        specs: Sequence[LayerSpec],
-        *,
-        filters: bool,
-        **request: Any,  # noqa: ANN401 - see `Source`
-    ) -> Iterator[tuple[RawLayer, str]]:
-        for layer in read(fetch_layers(specs, **request), specs, filters=filters):
-            yield layer, ""
-
-    return fetch
+    return lambda specs, *, filters, **request: [
+        (layer, "") for layer in read(fetch_layers(specs, **request), specs, filters=filters)
+    ]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import bz2
-import gzip
 import itertools
 import pickle
 import subprocess
@@ -47,8 +45,6 @@ TREE = {"natural": "tree"}
 BENCH = {"amenity": "bench"}
 HOUSE = {"building": "yes"}
 STREET = {"highway": "residential"}
-PACKED = [".osm", ".osm.gz", ".osm.bz2", ".osm.pbf"]
-FORMATS = [*PACKED, ".pbf"]
 
 
 def tagged(key: str, *values: str) -> tuple[tuple[tuple[str, tuple[str, ...]], ...], ...]:
@@ -208,14 +204,6 @@ def write_pbf(path: Path, elements: Iterable[Any]) -> Path:
     return path
 
 
-def in_formats(plain: Path) -> dict[str, bytes]:
-    """Return the content of an XML file in every format, by suffix."""
-    content = plain.read_bytes()
-    packed = write_pbf(plain.with_suffix(".osm.pbf"), osmium.FileProcessor(str(plain)))
-    packings = (content, gzip.compress(content), bz2.compress(content))
-    return dict(zip(FORMATS, (*packings, *(packed.read_bytes(),) * 2), strict=True))
-
-
 def test_layers_are_read_in_the_requested_order(read: Read) -> None:
     layers = read(
         [STREETS, BENCHES, TREES, BUILDINGS],
@@ -240,17 +228,6 @@ def test_layers_are_read_in_the_requested_order(read: Read) -> None:
     assert benches.table.class_name.tolist() == ["bench"] * 3
     assert buildings.table.class_name.tolist() == [""]
     assert all(layer.table.crs == "EPSG:4326" and layer.notes == () for layer in layers)
-
-
-@pytest.mark.parametrize("suffix", [*FORMATS, ".OSM", ".Osm.PBF"])
-def test_all_formats_give_the_same_layers(tmp_path: Path, suffix: str) -> None:
-    elements = (*CORNERS, way(7, [1, 2], BENCH), way(8, [1, 2, 3, 4, 1], HOUSE))
-    plain = write_osm(tmp_path / "plain.osm", *elements)
-    path = tmp_path / f"city{suffix}"
-    path.write_bytes(in_formats(plain)[suffix.lower()])
-    benches, buildings = read_layers(str(path), [BENCHES, BUILDINGS])
-    assert shapes_by_id(benches) == {"way/7": "LINESTRING (0 0, 1 0)"}
-    assert shapes_by_id(buildings) == {"way/8": "POLYGON ((0 0, 1 0, 1 1, 0 1, 0 0))"}
 
 
 # Elements in two extracts and the expected result, in either order.

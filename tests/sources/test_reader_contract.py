@@ -16,13 +16,13 @@ import osmium
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
-import pyogrio
 import pytest
 import shapely
 from geojson import collection, feature, point
 from osm_xml import node, write_osm
 from raw_layers import ENGINES
 from sentences import refused
+from vector_files import write as write_table
 
 from semsig_gis.core import CatalogError, CrsError, SourceError
 from semsig_gis.sources import (
@@ -67,27 +67,11 @@ def frame(rows: Rows) -> gpd.GeoDataFrame:
 def write_vector(path: Path, rows: Rows) -> None:
     # FlatGeobuf would put the rows in another order for its index.
     options = {"SPATIAL_INDEX": "NO"} if path.suffix == ".fgb" else {}
-    pyogrio.write_dataframe(frame(rows), path, geometry_type="Point", **options)
+    write_table(frame(rows), path.parent, path.suffix[1:], geometry_type="Point", **options)
 
 
 def write_parquet(path: Path, rows: Rows) -> None:
     frame(rows).to_parquet(path)
-
-
-def write_zip(path: Path, rows: Rows) -> None:
-    folder = path.parent / "inner"
-    folder.mkdir(exist_ok=True)
-    write_vector(folder / "a.shp", rows)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in folder.iterdir():
-            archive.write(file, file.name)
-
-
-def write_csv(path: Path, rows: Rows) -> None:
-    table = frame(rows)
-    pd.DataFrame(table.drop(columns="geometry")).assign(
-        lon=table.geometry.x, lat=table.geometry.y
-    ).to_csv(path, sep=";", index=False)
 
 
 def elements(rows: Rows) -> list[tuple[int, float, float, dict[str, str]]]:
@@ -101,11 +85,12 @@ def elements(rows: Rows) -> list[tuple[int, float, float, dict[str, str]]]:
 def write_extract(path: Path, rows: Rows) -> None:
     """Write an extract of OpenStreetMap, packed as its suffix says."""
     plain = write_osm(path.with_suffix(".xml"), *(node(*element) for element in elements(rows)))
-    if path.suffix == ".pbf":
-        path.unlink(missing_ok=True)
-        with osmium.SimpleWriter(str(path)) as writer:
+    if path.suffix.lower() == ".pbf":
+        packed = path.with_name("packed.osm.pbf")
+        with osmium.SimpleWriter(str(packed)) as writer:
             for element in osmium.FileProcessor(str(plain), osmium.osm.NODE):
                 writer.add(element)
+        packed.replace(path)
         return
     content = plain.read_bytes()
     if path.suffix == ".gz":
@@ -178,16 +163,18 @@ NO_ANSWER = "is not an answer of Mapillary about map features"
 NO_GEOPARQUET = "cannot be read as GeoParquet"
 LAMBERT = "EPSG:2154"
 KINDS = {
-    "CSV": Case("vector_file", "csv", write_csv, THINGS, crs=LAMBERT),
+    "CSV": Case("vector_file", "csv", write_vector, THINGS, crs=LAMBERT),
     "FlatGeobuf": Case("vector_file", "fgb", write_vector, THINGS),
     "GeoJSON": Case("vector_file", "geojson", write_vector, THINGS, "cannot be read ("),
     "GeoPackage": Case("vector_file", "gpkg", write_vector, THINGS, "cannot be read ("),
     "shapefile": Case("vector_file", "shp", write_vector, THINGS),
-    "archive": Case("vector_file", "zip", write_zip, THINGS, "cannot be read (File is not a zip"),
+    "archive": Case("vector_file", "zip", write_vector, THINGS, "(File is not a zip file)"),
     "OSM": Case("osm_file", "osm", write_extract, TAGGED, DAMAGED),
     "OSM, gzip": Case("osm_file", "osm.gz", write_extract, TAGGED, DAMAGED),
     "OSM, bzip2": Case("osm_file", "osm.bz2", write_extract, TAGGED, DAMAGED),
-    "OSM, pbf": Case("osm_file", "osm.pbf", write_extract, TAGGED, DAMAGED),
+    "OSM, mixed case": Case("osm_file", "Osm.PBF", write_extract, TAGGED),
+    "OSM, upper case": Case("osm_file", "OSM", write_extract, TAGGED),
+    "OSM, pbf": Case("osm_file", "pbf", write_extract, TAGGED, DAMAGED),
     "Overpass": Case("overpass", "json", write_overpass, TAGGED, NO_OVERPASS,
                      "cannot be read (No such file", "cannot be read (Is a directory"),
     "table of OSM": Case("osm_features", "geojson", write_tagged, TAGGED, "cannot be read"),
@@ -197,7 +184,7 @@ KINDS = {
                      NO_GEOPARQUET, NO_GEOPARQUET, NO_GEOPARQUET),
     "portal JSON": Case("opendatasoft", "json", write_portal, THINGS, "is not whole JSON",
                         crs=LAMBERT),
-    "portal CSV": Case("opendatasoft", "csv", write_csv, THINGS, crs=LAMBERT),
+    "portal CSV": Case("opendatasoft", "csv", write_vector, THINGS, crs=LAMBERT),
     "GeoParquet": Case("opendatasoft", "parquet", write_parquet, THINGS, "is not a whole Parquet"),
     "GML": Case("wfs", "gml", write_gml, THINGS, "is not whole GML", crs=LAMBERT),
 }  # fmt: skip

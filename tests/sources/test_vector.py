@@ -24,6 +24,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 from sentences import refused
+from vector_files import pack, write
 
 from semsig_gis.core import CatalogError, CrsError, SourceError, UnknownNameError
 from semsig_gis.sources import ClassBy, LayerSpec, list_layers, read_layer
@@ -48,29 +49,6 @@ def spec_of(**what: Any) -> LayerSpec:  # noqa: ANN401 - any field of a LayerSpe
 def frame(xy: Iterable[tuple[float, float]], **columns: Any) -> gpd.GeoDataFrame:  # noqa: ANN401
     points = shapely.points(np.array(list(xy), dtype=float).reshape(-1, 2))
     return gpd.GeoDataFrame(columns, geometry=points, crs="EPSG:2154")
-
-
-def write(table: gpd.GeoDataFrame, folder: Path, suffix: str) -> Path:
-    """Write a table in a format of the package's list; a zip holds a shapefile."""
-    path = folder / f"things.{suffix}"
-    if suffix == "csv":
-        columns = table.drop(columns="geometry").assign(x=table.geometry.x, y=table.geometry.y)
-        columns.to_csv(path, sep=";", index=False)
-    elif suffix == "zip":
-        inner = folder / "inner"
-        inner.mkdir()
-        write(table, inner, "shp")
-        pack(path, *inner.iterdir())
-    else:
-        table.to_file(path)
-    return path
-
-
-def pack(archive: Path, *files: Path, inside: str = "") -> Path:
-    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as target:
-        for file in sorted(files):
-            target.write(file, inside + file.name)
-    return archive
 
 
 def text_file(folder: Path, name: str, text: str, encoding: str = "utf-8") -> Path:

@@ -7,7 +7,6 @@ caller names.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import email.utils
 import functools
 import gzip
@@ -49,6 +48,7 @@ ANYTHING = "*/*;q=0.1"
 NOT_MODIFIED, PARTIAL, RANGE_NOT_SATISFIABLE = 304, 206, 416
 
 Progress = Callable[[int, int], None]
+Pairs = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,20 +114,6 @@ class TransientError(Exception):
         self.slow = slow
 
 
-@dataclass(frozen=True, slots=True)
-class Request:
-    """An address with its query, requested by GET, or by POST if there is a form in `data`."""
-
-    url: str
-    params: tuple[tuple[str, str], ...] = ()
-    data: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def method(self) -> str:
-        """The HTTP method."""
-        return "POST" if self.data else "GET"
-
-
 class _Session(requests.Session):
     """A session with our User-Agent that accepts only gzip, until the deadline of a request."""
 
@@ -144,19 +130,24 @@ class _Session(requests.Session):
         return max(0.0, self.end - time.monotonic())
 
     @contextlib.contextmanager
-    def response(self, request: Request, headers: Mapping[str, str]) -> Iterator[requests.Response]:
+    def response(
+        self,
+        url: str,
+        headers: Mapping[str, str] | None = None,
+        params: Pairs | None = None,
+        data: Pairs = (),
+    ) -> Iterator[requests.Response]:
         """Send a request, follow redirects within the host, and provide the response unread."""
-        url = request.url
-        params: tuple[tuple[str, str], ...] | None = request.params
+        address = url
         connect, read = self.spec.timeout
         for _ in range(MAX_REDIRECTS + 1):
             left = self.seconds_left + 0.01  # a timeout of 0 is not accepted
             send = functools.partial(
                 self.request,
-                request.method,
-                url,
+                "POST" if data else "GET",
+                address,
                 params=params,
-                data=request.data or None,
+                data=data or None,
                 headers=headers,
                 timeout=(min(connect, left), min(read, left)),
                 stream=True,
@@ -165,17 +156,15 @@ class _Session(requests.Session):
             try:
                 response = _call_within(self.seconds_left, send)
             except (TimeoutError, requests.RequestException, urllib3.exceptions.HTTPError) as error:
-                raise _connection_error(error, request.url) from error
+                raise _connection_error(error, url) from error
             with response:
                 if response.status_code not in REDIRECTS:
                     yield response
                     return
                 target = urljoin(response.url, response.headers.get("Location", ""))
                 _check_redirect(response.url, target, self.spec)
-                url, params = target, None
-        raise HttpError(
-            f"{host_of(request.url)} redirects too often from {request.url}; check the address."
-        )
+                address, params = target, None
+        raise HttpError(f"{host_of(url)} redirects too often from {url}; check the address.")
 
     def blocks(self, response: requests.Response) -> Iterator[bytes]:
         """Yield the body as it is sent; TransientError if the server hangs up, stops or is slow."""
@@ -341,8 +330,11 @@ def fetch(
     Raises HttpError, TooLargeError, NotCachedError or another SourceError.
     """
     check_url(url)
-    request = Request(url, _pairs(params), _pairs(data))
-    key = cache_key([request.method, identity or url, request.params, request.data])
+    query, form = (
+        tuple(sorted((name, str(value)) for name, value in (pairs or {}).items()))
+        for pairs in (params, data)
+    )
+    key = cache_key(["POST" if form else "GET", identity or url, query, form])
     if spec.offline:
         return cached_file(cache, key, what=url)
     with cache.locked(key) as entry:
@@ -351,7 +343,7 @@ def fetch(
             age = datetime.now(UTC) - datetime.fromisoformat(cached.fetched_at)
             if age.total_seconds() < spec.fresh_s:
                 return cached
-        download = _Download(request, entry, cached, spec, accept, suffix, check, progress)
+        download = _Download(url, query, form, entry, cached, spec, accept, suffix, check, progress)
         try:
             return download.run(before)
         except SourceError as error:
@@ -384,7 +376,7 @@ def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
     """Request a short text once, without the cache, and return up to 64 KiB of it."""
     check_url(url)
     try:
-        with _Session(spec) as session, session.response(Request(url), {}) as response:
+        with _Session(spec) as session, session.response(url) as response:
             session.check_status(response)
             return session.start_of_body(response).decode("utf-8", errors="replace")
     except TransientError as error:
@@ -398,7 +390,9 @@ def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
 class _Download:
     """A request that is repeated until its file is in the cache."""
 
-    request: Request
+    url: str
+    params: Pairs
+    data: Pairs
     entry: CacheEntry
     cached: Fetched | None
     spec: HttpSpec
@@ -410,7 +404,7 @@ class _Download:
     @property
     def host(self) -> str:
         """The host of the request, for messages."""
-        return host_of(self.request.url)
+        return host_of(self.url)
 
     def run(self, before: Callable[[], None] | None) -> Fetched:
         """Try until the file is complete, the attempts are used up or the time is over."""
@@ -450,9 +444,9 @@ class _Download:
 
     def attempt(self, session: _Session) -> Fetched:
         """Request the file once, or the rest of it; return it from the cache."""
-        request, entry, spec = self.request, self.entry, self.spec
+        entry, spec = self.entry, self.spec
         offset, part_version, headers = self.range_and_headers()
-        with session.response(request, headers) as response:
+        with session.response(self.url, headers, self.params, self.data) as response:
             if response.status_code == NOT_MODIFIED and self.cached is not None:
                 entry.drop_part()
                 return self.cached
@@ -472,7 +466,7 @@ class _Download:
             if self.accept and version.content_type and version.content_type not in self.accept:
                 raise SourceError(
                     f"{self.host} sent {version.content_type} where "
-                    f"{' or '.join(self.accept)} was expected; check the address {request.url}."
+                    f"{' or '.join(self.accept)} was expected; check the address {self.url}."
                 )
             if version.encoding not in {"", "gzip", "x-gzip"}:
                 raise SourceError(
@@ -488,7 +482,7 @@ class _Download:
             sha256 = self.unpack(body, version.encoding)
             if self.check is not None:
                 self.check(body)
-            what = dataclasses.asdict(request)
+            what = {"url": self.url, "params": self.params, "data": self.data}
             return entry.store(body, sha256=sha256, url=url, request=what, version=version)
         finally:
             body.unlink(missing_ok=True)
@@ -496,7 +490,7 @@ class _Download:
 
     def range_and_headers(self) -> tuple[int, FileVersion, dict[str, str]]:
         """Return the size and version of the part to resume, and the headers to send."""
-        is_get = self.request.method == "GET"
+        is_get = not self.data
         offset, version = self.entry.resumable() if is_get else (0, FileVersion())
         headers = self.cached.condition if self.cached and is_get else {}
         if self.accept:
@@ -550,7 +544,3 @@ class _Download:
                 f"{self.host} sends more than the {self.spec.max_bytes:,} bytes that are "
                 "accepted; ask for a smaller area or for fewer layers."
             )
-
-
-def _pairs(items: Mapping[str, str | float] | None) -> tuple[tuple[str, str], ...]:
-    return tuple(sorted((name, str(value)) for name, value in (items or {}).items()))
