@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-import re
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import CatalogError, UnknownNameError, nearest_name
+from semsig_gis.core.inputs import Matching, Range, check_fields, metres
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -56,35 +56,16 @@ class ObjectClass:
     'D'
     """
 
-    code: int
-    symbol: str
-    name: str
+    code: Annotated[int, Range("a whole number from 1 to 255", 1, MAX_CODE, whole=True)]
+    symbol: Annotated[str, Matching("[A-Za-z0-9]", "one ASCII letter or digit")]
+    name: Annotated[str, Matching("[a-z][a-z0-9_]*", "lower-case letters, digits and underscores")]
     title: str
-    range_m: float | None = None
-    height_m: float | None = None
-    height_sigma: float | None = None
+    range_m: Annotated[float, metres(MAX_RANGE_M)] | None = None
+    height_m: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
+    height_sigma: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
-        # Not isinstance: a bool is an int, but not a code.
-        if type(self.code) is not int or not 1 <= self.code <= MAX_CODE:
-            raise CatalogError(
-                f"class {self.name!r} has code {self.code!r}; codes are whole numbers 1 to 255."
-            )
-        if type(self.symbol) is not str or not re.fullmatch(r"[A-Za-z0-9]", self.symbol):
-            raise CatalogError(
-                f"class {self.name!r} has symbol {self.symbol!r}; "
-                "a symbol is one ASCII letter or digit."
-            )
-        if type(self.name) is not str or not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
-            raise CatalogError(
-                f"class name {self.name!r} is not usable; "
-                "write lower-case letters, digits and underscores."
-            )
-        if self.range_m is not None and not 0 < self.range_m <= MAX_RANGE_M:  # false for NaN too
-            raise CatalogError(
-                f"class {self.name!r} is seen from {self.range_m!r} m; give a number of metres "
-                f"above 0 and up to {MAX_RANGE_M:.0f}."
-            )
+        check_fields(self, f"class {self.name!r}", error=CatalogError)
         check_height(self.height_m, self.height_sigma, f"class {self.name!r}")
 
 

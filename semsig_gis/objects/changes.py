@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import pandas as pd
@@ -12,11 +12,13 @@ import pandas as pd
 from semsig_gis.core import (
     CLASS_CODE,
     MERGED,
+    MOST_METRES,
     SOURCE,
     SOURCE_ID,
     CatalogError,
     CrsError,
     InputError,
+    Range,
 )
 from semsig_gis.objects.table import Licence, StreetObjects, join_licences, layer_note
 
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
 IDENTIFIER = [SOURCE, SOURCE_ID]
 CLASS_AND_PLACE = [CLASS_CODE, "x", "y"]
+_Count = Annotated[int, Range("a whole number, 0 or more", 0, whole=True)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,14 +44,14 @@ class ClassChange:
     """
 
     class_name: str
-    before: int
-    after: int
-    added: int
-    removed: int
-    moved: int
-    moved_m: float | None
-    gained: int
-    lost: int
+    before: _Count
+    after: _Count = 0
+    added: _Count = 0
+    removed: _Count = 0
+    moved: _Count = 0
+    moved_m: Annotated[float, Range("metres, 0 or more", 0, MOST_METRES)] | None = None
+    gained: _Count = 0
+    lost: _Count = 0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -2,12 +2,11 @@
 
 from .area import Area as Area
 from .area import join_areas as join_areas
-from .catalog import CATALOG_KEYS as CATALOG_KEYS
-from .catalog import CLASS_KEYS as CLASS_KEYS
 from .catalog import MEASURES as MEASURES
 from .catalog import Catalog as Catalog
 from .catalog import built_in_taxonomy as built_in_taxonomy
 from .catalog import catalog_names as catalog_names
+from .catalog import catalog_schema as catalog_schema
 from .catalog import combine_catalogs as combine_catalogs
 from .catalog import data_folder as data_folder
 from .catalog import load_catalog as load_catalog
@@ -57,9 +56,6 @@ from .http.fetch import read_text as read_text
 from .layer import RawLayer as RawLayer
 from .layer import Reader as Reader
 from .layer import RowCounts as RowCounts
-from .layer_spec import CLASS_BY_KEYS as CLASS_BY_KEYS
-from .layer_spec import LAYER_KEYS as LAYER_KEYS
-from .layer_spec import WIDTH_BY_KEYS as WIDTH_BY_KEYS
 from .layer_spec import ClassBy as ClassBy
 from .layer_spec import ElementKind as ElementKind
 from .layer_spec import GeometryKind as GeometryKind

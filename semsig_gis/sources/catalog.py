@@ -7,57 +7,84 @@ import functools
 import importlib.resources
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from semsig_gis.core import (
-    MAX_HEIGHT_M,
     MAX_RANGE_M,
     CatalogError,
     CrsError,
     Displayed,
+    FileTable,
     InputError,
     ObjectClass,
     Taxonomy,
+    Texts,  # noqa: TC001 - of fields
     UnknownNameError,
+    file_key,
     installed_catalogs,
+    json_schema,
+    length,
+    metres,
     nearest_name,
+    pairs,
+    read_table,
     require_metric_crs,
 )
-from semsig_gis.sources.layer_spec import conditions_of, layer_of, require_class
-from semsig_gis.storage import check_keys, metres, parse_toml, read_text, texts
+from semsig_gis.sources.layer_spec import Conditions, LayerSpec  # noqa: TC001
+from semsig_gis.storage import parse_toml, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from importlib.resources.abc import Traversable
 
-    from semsig_gis.sources.layer_spec import LayerSpec
-
 
 # TOML files in the same folder that are not catalogues: classes, keywords and more.
 NO_CATALOGS = frozenset({"drift", "geofabrik", "keywords", "taxonomy"})
-# Keys of a catalogue and their types; another key is an error.
-CATALOG_KEYS = {
-    "name": str,
-    "title": str,
-    "place": str,
-    "url": str,
-    "license": str,
-    "attribution": str,
-    "metric_crs": str,
-    "reader": str,
-    "endpoints": list,
-    "token": str,
-    "geocoder": str,
-    "files": list,
-    "not": dict,
-    "conflate": dict,
-    "ranges": dict,
-    "classes": list,
-    "layers": list,
-}
-CLASS_KEYS = {"code": int, "symbol": str, "name": str, "title": str}
-MEASURES = {"range_m": MAX_RANGE_M, "height_m": MAX_HEIGHT_M, "height_sigma": MAX_HEIGHT_M}
+MEASURES = ("range_m", "height_m", "height_sigma")
+PLAIN_KEYS = frozenset(
+    {
+        *("name", "title", "place", "url", "license", "attribution", "metric_crs", "reader"),
+        *("endpoints", "token", "geocoder"),
+    }
+)
 MAX_MERGING_M = 100.0
+
+
+_ByClass = tuple[tuple[str, float], ...]
+
+
+class CatalogFile(FileTable):
+    """The keys of a file that are not described by `Catalog`.
+
+    Parameters
+    ----------
+    files : tuple of str
+        Files of layers that name none.
+    exclusions : mapping of str to values
+        What leaves a row out of every layer of objects that has no ``not``.
+    ranges : mapping of str to float
+        Distances in metres from which classes are visible.
+    classes : tuple of ObjectClass
+        Classes that the paper does not have.
+    """
+
+    name: str
+    title: str
+    place: str = ""
+    url: str = ""
+    license: str = "unknown"
+    attribution: str = ""
+    metric_crs: str | None = None
+    reader: str = "vector_file"
+    endpoints: Texts = ()
+    token: str | None = None
+    geocoder: str | None = None
+    files: Texts = ()
+    exclusions: Annotated[Conditions, file_key("not")] = ()
+    conflate: Annotated[_ByClass, pairs(Annotated[float, metres(MAX_MERGING_M)])] = ()
+    ranges: Annotated[_ByClass, pairs(Annotated[float, metres(MAX_RANGE_M)])] = ()
+    classes: tuple[ObjectClass, ...] = ()
+    layers: Annotated[tuple[LayerSpec, ...], length(1)]
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -158,8 +185,7 @@ def paper_taxonomy() -> Taxonomy:
     """
     source = data_folder() / "taxonomy.toml"
     content = parse_toml(source.read_text(encoding="utf-8"), "taxonomy.toml")
-    check_keys(content, {"classes": list}, "taxonomy.toml")
-    return Taxonomy(_classes(content["classes"], "taxonomy.toml"))
+    return Taxonomy(tuple(ObjectClass(**item) for item in content["classes"]))
 
 
 def catalog_names() -> tuple[str, ...]:
@@ -313,78 +339,72 @@ def data_folder() -> Traversable:
 
 def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     where = f"catalogue {where}"
-    check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
-    own_classes = _classes(content.get("classes", []), where)
+    file = read_table(CatalogFile, _with_inherited(content, where), where)
+    place = where
     try:
-        taxonomy = paper_taxonomy().extended(own_classes)
-        if "metric_crs" in content:
-            require_metric_crs(content["metric_crs"])
-    except (CatalogError, CrsError) as error:
-        raise CatalogError(f"{where}: {error}") from error
-    ranges = _metres_by_class(
-        content.get("ranges", {}), taxonomy, f"{where}, ranges", most=MAX_RANGE_M
-    )
-    double = next((name for name in ranges if taxonomy.by_name(name).range_m is not None), None)
+        taxonomy = paper_taxonomy().extended(file.classes)
+        if file.metric_crs is not None:
+            require_metric_crs(file.metric_crs)
+        place = f"{where}, conflate"
+        for name, _ in file.conflate:
+            taxonomy.by_name(name)
+        place = f"{where}, ranges"
+        ranges = dict(file.ranges)
+        double = next((name for name in ranges if taxonomy.by_name(name).range_m is not None), None)
+        taxonomy = taxonomy.with_ranges(ranges)
+        for spec in file.layers:
+            place = f"{where}, layer {spec.name!r}"
+            spec.check(taxonomy)
+    except (CatalogError, CrsError, UnknownNameError) as error:
+        raise CatalogError(f"{place}: {error}") from error
     if double is not None:
         raise CatalogError(
             f"{where} has a range_m of {double!r} and one in ranges; remove one of them."
         )
-    taxonomy = taxonomy.with_ranges(ranges)
-    plain = {key: value for key, value in content.items() if CATALOG_KEYS[key] is str}
-    # Values of the catalogue that its layers inherit.
-    shared: dict[str, Any] = {
-        key: plain[key] for key in ("license", "attribution", "reader") if key in plain
-    }
-    shared["files"] = texts(content.get("files", []), "files", where)
-    shared["exclusions"] = conditions_of(content.get("not", {}), "not", where)
-    layers = tuple(
-        layer_of(item, where, taxonomy=taxonomy, shared=shared) for item in content["layers"]
-    )
-    names = [spec.name for spec in layers]
+    names = [spec.name for spec in file.layers]
     double = next((name for name in names if names.count(name) > 1), None)
-    if double is not None or not names:
-        what = f"two layers named {double!r}; rename one" if names else "no layer; add [[layers]]"
-        raise CatalogError(f"{where} has {what}.")
-    radii = _metres_by_class(
-        content.get("conflate", {}), taxonomy, f"{where}, conflate", most=MAX_MERGING_M
-    )
+    if double is not None:
+        raise CatalogError(f"{where} has two layers named {double!r}; rename one.")
     return Catalog(
-        **plain,
+        **{name: getattr(file, name) for name in file.model_fields_set & PLAIN_KEYS},
         taxonomy=taxonomy,
-        layers=layers,
-        endpoints=texts(content.get("endpoints", []), "endpoints", where),
-        conflate=tuple(radii.items()),
+        layers=tuple(dataclasses.replace(spec, reader=file.reader) for spec in file.layers),
+        conflate=file.conflate,
     )
+
+
+def catalog_schema() -> dict[str, Any]:
+    """Return the JSON Schema of catalogues, ``catalog.schema.json``."""
+    schema = json_schema(CatalogFile, described_by=Catalog)
+    layer = schema["$defs"]["LayerSpec"]["properties"]
+    del layer["reader"]  # all layers of a catalogue have its reader
+    layer["class"]["examples"] = [item.name for item in paper_taxonomy().classes]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _with_inherited(content: dict[str, Any], where: str) -> dict[str, Any]:
+    """Return a catalogue, its layers with the values that they inherit from it."""
+    layers: object = content.get("layers")
+    if not isinstance(layers, list):
+        return content
+    shared = {key: content[key] for key in ("files", "license", "attribution") if key in content}
+    exclusions = {"not": content["not"]} if "not" in content else {}
+    complete = []
+    for item in layers:
+        if isinstance(item, dict):
+            if "reader" in item:
+                raise CatalogError(
+                    f"{where}, layer {item.get('name')!r} has a reader; the catalogue has one for "
+                    "all of its layers."
+                )
+            is_objects = item.get("role", "objects") == "objects"
+            complete.append({**shared, **(exclusions if is_objects else {}), **item})
+        else:
+            complete.append(item)
+    return {**content, "layers": complete}
 
 
 # The same text is parsed only once.
 _parse_catalog = functools.lru_cache(
     lambda text, where: _checked_catalog(parse_toml(text, where), where)
 )
-
-
-def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
-    classes = []
-    for number, item in enumerate(items, start=1):
-        place = f"{where}, class {number}"
-        if not isinstance(item, dict):
-            raise CatalogError(f"{place} is {item!r}; write a [[classes]] table.")
-        check_keys(item, {**CLASS_KEYS, **dict.fromkeys(MEASURES, object)}, place, CLASS_KEYS)
-        lengths = {
-            key: metres(item[key], key, place, most=most)
-            for key, most in MEASURES.items()
-            if key in item
-        }
-        try:
-            classes.append(ObjectClass(**{**item, **lengths}))
-        except CatalogError as error:
-            raise CatalogError(f"{place}: {error}") from error
-    return tuple(classes)
-
-
-def _metres_by_class(
-    item: dict[str, Any], taxonomy: Taxonomy, where: str, *, most: float
-) -> dict[str, float]:
-    for name in item:
-        require_class(name, taxonomy, where)
-    return {name: metres(value, name, where, most=most) for name, value in item.items()}

@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core import CatalogError, UnknownNameError
-from semsig_gis.sources.filters import COMPARES, Condition, Value
-from semsig_gis.storage import check_keys, metres, one_of, texts
+from semsig_gis.core import (
+    Accepts,
+    CatalogError,
+    Flag,  # noqa: TC001 - of fields, as the next
+    Parsed,
+    Range,
+    Scalar,
+    Text,
+    Texts,
+    file_key,
+    length,
+    metres,
+    pairs,
+)
+from semsig_gis.sources.filters import COMPARES, Condition, Rules, Value  # noqa: TC001
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from semsig_gis.core import Taxonomy
-    from semsig_gis.sources.filters import Rules
 
 
 GeometryKind = Literal["point", "line", "polygon"]
@@ -25,6 +34,62 @@ Role = Literal["objects", "buildings", "streets"]
 # Plausible widths of a street; other numbers have another unit or another meaning.
 MIN_WIDTH_M = 0.1
 MAX_WIDTH_M = 200.0
+
+
+def _conditions(table: dict[str, Any]) -> Rules:
+    """Return the rules of a table of conditions; CatalogError if a condition is not valid."""
+    rules = []
+    for field, accepted in table.items():
+        values = accepted if isinstance(accepted, list) else [accepted]
+        try:
+            Condition.parse(values)
+        except CatalogError as error:
+            raise CatalogError(f"{field} = {accepted!r} cannot be used: {error}") from error
+        rules.append((field, tuple(values)))
+    return tuple(rules)
+
+
+def _tags(table: dict[str, Any]) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the tags of an alternative; CatalogError for a comparison, as tags are exact."""
+    tags = tuple(
+        (key, tuple(value) if isinstance(value, list) else (value,)) for key, value in table.items()
+    )
+    for key, values in tags:
+        comparison = next(filter(COMPARES.match, values), None)
+        if comparison is not None:
+            raise CatalogError(
+                f"the tag {key!r} = {comparison!r} is a comparison, and tags are exact; compare in "
+                f"where = {{ {key} = {comparison!r} }}."
+            )
+    return tags
+
+
+def _ordered(limits: tuple[int, int]) -> tuple[int, int]:
+    if limits[0] > limits[1]:
+        raise ValueError
+    return limits
+
+
+def _crs(code: str) -> str:
+    try:
+        CRS.from_user_input(code)
+    except CRSError as error:
+        raise ValueError from error
+    return code
+
+
+_Accepted = Annotated[
+    Scalar | Annotated[list[Scalar], length(1)],
+    Accepts("the accepted value, or a list of accepted values"),
+]
+Conditions = Annotated[Rules, Parsed(_conditions, dict[str, _Accepted])]
+_Tag = Annotated[Text | list[Text], Accepts("a text or a list of texts")]
+_Tags = Annotated[
+    tuple[tuple[str, tuple[str, ...]], ...],
+    Parsed(_tags, Annotated[dict[str, _Tag], length(1)]),
+]
+_Count = Annotated[int, Range("a number of rows", 0, whole=True)]
+_Width = Annotated[float, metres(MAX_WIDTH_M)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +101,15 @@ class ClassBy:
     """
 
     field: str
-    classes: tuple[tuple[Value, str], ...]
-    otherwise: bool = False
+    classes: Annotated[tuple[tuple[Value, str], ...], pairs(str), file_key("values")]
+    otherwise: Annotated[
+        bool,
+        Parsed(bool, Literal["class"]),
+        Accepts(
+            "'class', which gives other values the layer's class, or remove it, so that they are "
+            "left out"
+        ),
+    ] = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +120,8 @@ class WidthBy:
     """
 
     field: str
-    widths: tuple[tuple[Value, float], ...]
-    default: float | None = None
+    widths: Annotated[tuple[tuple[Value, float], ...], pairs(_Width), file_key("values")]
+    default: _Width | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,46 +130,62 @@ class LayerSpec:
 
     Parameters
     ----------
-    name, class_name : str
-        Name of the layer in the catalogue, and class of its rows; empty where `class_by` decides
-        the class of every row, and for surroundings.
+    name : str
+        Name of the layer in the catalogue.
+    class_name : str
+        Class of its rows; empty where `class_by` decides the class of every row, and for
+        surroundings.
     files : tuple of str
         Name patterns (``*``, ``?``) of the layer's file.
     layer : str, optional
         Layer inside a file that holds several.
-    where, exclusions : tuple of (str, tuple)
-        Fields or tags with accepted values. A row counts if it meets all conditions of `where` and
-        no condition of `exclusions`. Values are exact, except texts between slashes (a regular
-        expression for the whole value), comparisons such as ``">=0"``, ``"none"`` (absent or
-        empty) and ``"*"`` (every value except ``"no"``).
+    where : tuple of (str, tuple)
+        Fields or tags with accepted values; a row counts if it meets all conditions. Values are
+        exact, except texts between slashes (a regular expression for the whole value), comparisons
+        such as ``">=0"``, ``"none"`` (absent or empty) and ``"*"`` (every value except ``"no"``).
+    exclusions : tuple of (str, tuple)
+        Conditions of the same form; a row that meets one is left out.
     class_by : ClassBy, optional
         Field that decides the class row by row.
-    width_by, width_field : WidthBy, str, optional
-        For streets: the field that decides the width by its value, and the field of the width in
-        metres, which has priority.
+    width_by : WidthBy, optional
+        For streets: the field that decides the width by its value.
+    width_field : str, optional
+        For streets: the field of the width in metres, which has priority over `width_by`.
     name_field : str, optional
         For streets: the field of the name.
-    id_field, unique_id : str, bool, optional
-        Field that identifies a row in its source (by default the number of the feature), and
-        whether rows with the same id are the same object, also in several files.
-    geometry, crs, rows : {"point", "line", "polygon"}, str, tuple of (int, int), optional
-        Expected geometry, CRS (used if the file states none), and minimum and maximum number of
-        rows.
+    id_field : str, optional
+        Field that identifies a row in its source; by default the number of the feature.
+    unique_id : bool
+        Whether rows with the same id are the same object, also in several files.
+    geometry : {"point", "line", "polygon"}
+        Expected geometry.
+    crs : str, optional
+        CRS if the file states none, such as ``EPSG:4326``.
+    rows : tuple of (int, int), optional
+        Expected minimum and maximum number of rows.
     x_field, y_field : str, optional
         Coordinate columns of a CSV file.
     aliases : tuple of (str, tuple of str)
         Fields and their names in other editions of the file (Opendatasoft only).
-    dataset, server_where, select : str, str, tuple of str, optional
-        Name of the dataset on its portal, filter in the query language of the portal, and fields
-        to request.
-    tags, elements : tuple of tuple of (str, tuple of str), tuple of {"node", "way", "relation"}
-        Alternatives of OpenStreetMap tags, and kinds of element. An element counts if it has all
-        tags of one alternative; the value ``"*"`` accepts every value except ``"no"``.
+    dataset : str, optional
+        Name of the dataset on its portal.
+    server_where : str, optional
+        Filter in the query language of the portal.
+    select : tuple of str
+        Fields to request; all by default.
+    tags : tuple of tuple of (str, tuple of str)
+        Alternatives of OpenStreetMap tags, or columns of Overture Maps. An element counts if it
+        has all tags of one alternative; the value ``"*"`` accepts every value except ``"no"``.
+    elements : tuple of {"node", "way", "relation"}
+        Kinds of OpenStreetMap element.
     role : {"objects", "buildings", "streets"}
         Street objects, footprints of buildings, or centre lines. Only objects have a class.
-    optional, reader, note : bool, str, str
-        Whether the layer is read only on request, the reader of its file, and a remark for
-        users.
+    optional : bool
+        Whether the layer is read only on request.
+    reader : str
+        The reader of its file.
+    note : str
+        A remark for users.
     license, attribution : str
         Licence of the data and the credit line that its publisher requires.
 
@@ -108,30 +196,30 @@ class LayerSpec:
     """
 
     name: str
-    class_name: str
-    files: tuple[str, ...] = ()
+    class_name: Annotated[str, file_key("class")] = ""
+    files: Texts = ()
     layer: str | None = None
-    where: Rules = ()
-    exclusions: Rules = ()
+    where: Conditions = ()
+    exclusions: Annotated[Conditions, file_key("not")] = ()
     class_by: ClassBy | None = None
     width_by: WidthBy | None = None
     width_field: str | None = None
     name_field: str | None = None
     id_field: str | None = None
     geometry: GeometryKind = "point"
-    crs: str | None = None
-    rows: tuple[int, int] | None = None
+    crs: Annotated[str, Parsed(_crs), Accepts("a known code such as 'EPSG:4326'")] | None = None
+    rows: Annotated[tuple[_Count, _Count], Parsed(_ordered), Accepts("[least, most]")] | None = None
     x_field: str | None = None
     y_field: str | None = None
-    aliases: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    unique_id: bool = False
+    aliases: Annotated[tuple[tuple[str, tuple[str, ...]], ...], pairs(Texts)] = ()
+    unique_id: Flag = False
     dataset: str | None = None
     server_where: str | None = None
-    select: tuple[str, ...] = ()
-    tags: tuple[tuple[tuple[str, tuple[str, ...]], ...], ...] = ()
+    select: Texts = ()
+    tags: tuple[_Tags, ...] = ()
     elements: tuple[ElementKind, ...] = ("node", "way", "relation")
     role: Role = "objects"
-    optional: bool = False
+    optional: Flag = False
     reader: str = "vector_file"
     note: str = ""
     license: str = "unknown"
@@ -168,192 +256,20 @@ class LayerSpec:
         uses += [("id_field", self.id_field)] if self.id_field else []
         return tuple(uses)
 
-
-LAYER_KEYS = {
-    "name": str,
-    "class": str,
-    "files": list,
-    "layer": str,
-    "where": dict,
-    "not": dict,
-    "class_by": dict,
-    "width_by": dict,
-    "width_field": str,
-    "name_field": str,
-    "aliases": dict,
-    "id_field": str,
-    "unique_id": bool,
-    "dataset": str,
-    "server_where": str,
-    "select": list,
-    "tags": list,
-    "elements": list,
-    "role": str,
-    "optional": bool,
-    "note": str,
-    "geometry": str,
-    "crs": str,
-    "rows": list,
-    "x_field": str,
-    "y_field": str,
-    "license": str,
-    "attribution": str,
-}
-CLASS_BY_KEYS = {"field": str, "values": dict}
-OTHERWISE = "class"  # the only value of the key `otherwise` of class_by
-WIDTH_BY_KEYS = {"field": str, "values": dict, "default": object}
-
-
-def layer_of(
-    item: object, where: str, *, taxonomy: Taxonomy, shared: Mapping[str, Any]
-) -> LayerSpec:
-    """Return the layer of a ``[[layers]]`` table; CatalogError if it is not valid.
-
-    `shared` has default files, reader, license, attribution and exclusions; the default exclusions
-    do not apply to surroundings.
-    """
-    if not isinstance(item, dict):
-        raise CatalogError(f"{where} has the layer {item!r}; write a [[layers]] table.")
-    where = f"{where}, layer {item.get('name', '?')!r}"
-    check_keys(item, LAYER_KEYS, where, ("name",))
-    role = one_of(item.get("role", "objects"), "role", get_args(Role), where)
-    class_by = _class_by(item, role, taxonomy, where)
-    if "crs" in item:
-        try:
-            CRS.from_user_input(item["crs"])
-        except CRSError as error:
-            raise CatalogError(
-                f"{where} has crs = {item['crs']!r}, which is unknown; "
-                "write a code such as 'EPSG:4326'."
-            ) from error
-    if role != "streets" and (of_streets := {"width_by", "width_field", "name_field"} & set(item)):
-        raise CatalogError(
-            f"{where} has {min(of_streets)}, which only streets have; remove it or add its role."
-        )
-    if item.get("unique_id", False) and "id_field" not in item:
-        raise CatalogError(
-            f"{where} has unique_id = true without an id_field; name the field of the ids."
-        )
-    files = texts(item.get("files", list(shared["files"])), "files", where)
-    if not files and ("files" in item or "dataset" not in item):
-        raise CatalogError(f"{where} has files = []; write a list of file names or patterns.")
-    kinds = texts(item.get("elements", list(get_args(ElementKind))), "elements", where)
-    exclusions = shared["exclusions"] if role == "objects" else ()
-    if "not" in item:
-        exclusions = conditions_of(item["not"], "not", where)
-    plain = {key: value for key, value in item.items() if LAYER_KEYS[key] in {str, bool}}
-    parsed = {
-        "class_name": plain.pop("class", ""),
-        "role": role,
-        "files": files,
-        "where": conditions_of(item.get("where", {}), "where", where),
-        "exclusions": exclusions,
-        "class_by": class_by,
-        "width_by": _width_by(item["width_by"], where) if "width_by" in item else None,
-        "aliases": tuple(
-            (field, texts(names, f"aliases of {field!r}", where))
-            for field, names in item.get("aliases", {}).items()
-        ),
-        "geometry": one_of(
-            item.get("geometry", "point"), "geometry", get_args(GeometryKind), where
-        ),
-        "rows": _rows(item["rows"], where) if "rows" in item else None,
-        "select": texts(item.get("select", []), "select", where),
-        "tags": tuple(_tags(tags, where) for tags in item.get("tags", [])),
-        "elements": tuple(one_of(kind, "elements", get_args(ElementKind), where) for kind in kinds),
-    }
-    return LayerSpec(**{**shared, **plain, **parsed})
-
-
-def _class_by(
-    layer: Mapping[str, Any], role: Role, taxonomy: Taxonomy, where: str
-) -> ClassBy | None:
-    """Check the classes of a layer; return its ``class_by`` or None."""
-    by = None
-    if "class_by" in layer:
-        item, inner = layer["class_by"], f"{where}, class_by"
-        check_keys(item, {**CLASS_BY_KEYS, "otherwise": str}, inner, CLASS_BY_KEYS)
-        if item.get("otherwise", OTHERWISE) != OTHERWISE:
-            raise CatalogError(
-                f"{inner} has otherwise = {item['otherwise']!r}; write {OTHERWISE!r}, which gives "
-                "other values the layer's class, or remove it, so that they are left out."
-            )
-        for value, name in item["values"].items():
-            if not isinstance(name, str):
-                raise CatalogError(f"{inner} has {value!r} = {name!r}; write the name of a class.")
-            require_class(name, taxonomy, inner)
-        by = ClassBy(item["field"], tuple(item["values"].items()), "otherwise" in item)
-    if role == "objects" and "class" not in layer and (by is None or by.otherwise):
-        raise CatalogError(f"{where} lacks the key 'class'; add it.")
-    if role != "objects" and "class" in layer:
-        raise CatalogError(f"{where} needs no class; remove it.")
-    if "class" in layer:
-        require_class(layer["class"], taxonomy, where)
-    return by
-
-
-def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    if not isinstance(item, dict) or not item:
-        raise CatalogError(f"{where} has the tags {item!r}; write a table of keys and values.")
-    tags = tuple(
-        (key, texts(value if isinstance(value, list) else [value], f"tag {key!r}", where))
-        for key, value in item.items()
-    )
-    for key, values in tags:
-        comparison = next(filter(COMPARES.match, values), None)
-        if comparison is not None:
-            raise CatalogError(
-                f"{where} has the tag {key!r} = {comparison!r}, and tags are exact; compare in "
-                f"where = {{ {key} = {comparison!r} }}."
-            )
-    return tags
-
-
-def require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
-    """Raise CatalogError for an unknown class, with the nearest name."""
-    try:
-        taxonomy.by_name(name)
-    except UnknownNameError as error:
-        raise CatalogError(f"{where}: {error}") from error
-
-
-def _width_by(item: dict[str, Any], where: str) -> WidthBy:
-    where = f"{where}, width_by"
-    check_keys(item, WIDTH_BY_KEYS, where, ("field", "values"))
-    default = item.get("default")
-    return WidthBy(
-        item["field"],
-        tuple(
-            (value, metres(width, repr(value), f"{where}, values", most=MAX_WIDTH_M))
-            for value, width in item["values"].items()
-        ),
-        None if default is None else metres(default, "default", where, most=MAX_WIDTH_M),
-    )
-
-
-def conditions_of(item: dict[str, Any], key: str, where: str) -> Rules:
-    """Check a TOML table of conditions, such as ``where`` or ``not``, and return its rules."""
-    rules = []
-    for field, accepted in item.items():
-        values: list[Any] = accepted if isinstance(accepted, list) else [accepted]
-        if not values or not all(isinstance(value, Value) for value in values):
-            raise CatalogError(
-                f"{where} filters {field!r} by {accepted!r}; "
-                "write the accepted value, or a list of accepted values."
-            )
-        try:
-            Condition.parse(values)
-        except CatalogError as error:
-            raise CatalogError(
-                f"{where} has {key} = {{ {field} = {accepted!r} }}: {error}"
-            ) from error
-        rules.append((field, tuple(values)))
-    return tuple(rules)
-
-
-def _rows(item: list[Any], where: str) -> tuple[int, int]:
-    match item:
-        # True and False are integers in Python, but not in a catalogue
-        case [int(least), int(most)] if 0 <= least <= most and bool not in map(type, item):
-            return least, most
-    raise CatalogError(f"{where} has rows = {item!r}; write [least, most].")
+    def check(self, taxonomy: Taxonomy) -> None:
+        """Raise CatalogError or UnknownNameError if the fields do not fit each other."""
+        by, is_objects = self.class_by, self.role == "objects"
+        if is_objects and not self.class_name and (by is None or by.otherwise):
+            raise CatalogError("the key 'class' is missing; add it.")
+        if not is_objects and self.class_name:
+            raise CatalogError(f"a layer of {self.role} needs no class; remove it.")
+        for name in (self.class_name, *(name for _, name in (by.classes if by else ()))):
+            if name:
+                taxonomy.by_name(name)
+        for key in ("width_by", "width_field", "name_field"):
+            if self.role != "streets" and getattr(self, key) is not None:
+                raise CatalogError(f"only streets have {key}; remove it or add its role.")
+        if self.unique_id and self.id_field is None:
+            raise CatalogError("unique_id needs an id_field; name the field of the ids.")
+        if not self.files and self.dataset is None:
+            raise CatalogError("files = [] names no file; write file names or patterns.")

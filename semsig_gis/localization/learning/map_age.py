@@ -5,15 +5,14 @@ from __future__ import annotations
 import functools
 import math
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from semsig_gis.core import Displayed, InputError
+from semsig_gis.core import Displayed, InputError, Range, check_fields, read_table
 from semsig_gis.localization.learning.fit import LEAST, MOST, shrunk_rates
-from semsig_gis.objects import ClassChange
+from semsig_gis.objects import ClassChange  # noqa: TC001 - of fields
 from semsig_gis.sources import data_folder
 from semsig_gis.storage import parse_toml, read_values
 
@@ -52,31 +51,19 @@ class Drift(Displayed):
     1.24
     """
 
-    years: float
+    years: Annotated[float, Range("years above 0 and up to 100", 0, MOST_YEARS, above=True)]
     classes: tuple[ClassChange, ...]
 
     def __post_init__(self) -> None:  # noqa: D105
-        years: object = self.years  # a file may have anything
-        if type(years) not in {int, float} or not 0 < self.years <= MOST_YEARS:
-            raise InputError(
-                f"years of the drift is {self.years!r}; give years above 0 and up to 100."
-            )
+        check_fields(self, "the drift")
         for item in self.classes:
-            counts = (item.before, item.added, item.removed, item.moved, item.gained, item.lost)
-            if not all(type(count) is int and count >= 0 for count in counts):
-                raise InputError(
-                    f"drift of class {item.class_name!r} has counts {counts}; give whole numbers."
-                )
-            metres = item.moved_m
-            if item.moved and not (isinstance(metres, (int, float)) and 0 <= metres < math.inf):
-                raise InputError(
-                    f"drift of class {item.class_name!r} has moved_m = {metres!r}; give metres."
-                )
             if item.before < item.removed + item.moved + item.lost:
                 raise InputError(
                     f"drift of class {item.class_name!r} has more objects removed, moved and lost "
                     f"than the {item.before} there were before; give counts that fit each other."
                 )
+            if item.moved and item.moved_m is None:
+                raise InputError(f"drift of class {item.class_name!r} lacks moved_m; give metres.")
         if not sum(item.before for item in self.classes):
             raise InputError(
                 "the drift report has no objects from before the change; give the report of a "
@@ -106,7 +93,7 @@ def named_drift() -> Drift:
     234
     """
     text = (data_folder() / "drift.toml").read_text(encoding="utf-8")
-    return _drift(parse_toml(text, "drift.toml"), "drift.toml")
+    return read_table(Drift, parse_toml(text, "drift.toml"), "drift.toml")
 
 
 def open_drift(path: str | Path) -> Drift:
@@ -140,32 +127,10 @@ def open_drift(path: str | Path) -> Drift:
     ...     open_drift(file).classes[0].removed
     3
     """
-    return _drift(read_values(path, "drift"), str(path))
-
-
-def _drift(values: Any, where: str) -> Drift:  # noqa: ANN401 - as a file has it
-    """Return the drift of the plain values of a file."""
-    if not isinstance(values, Mapping) or not isinstance(values.get("classes"), list):
-        raise InputError(
-            f"{where} has no list of classes; give what `semsig update --json` prints."
-        )
-    if "years" not in values:
-        raise InputError(
-            f"{where} does not say over how many years the city changed; add years, or write the "
-            "report with `semsig update --years N --json`."
-        )
-    names = {field.name for field in fields(ClassChange)}
-    plain = dict.fromkeys(names - {"class_name", "before", "moved_m"}, 0) | {"moved_m": None}
-    classes = []
-    for item in values["classes"]:
-        complete = isinstance(item, Mapping) and {"class_name", "before"} <= set(item) <= names
-        if not complete or not isinstance(item["class_name"], str):
-            raise InputError(
-                f"{where} has a class {item!r}; give class_name, before and any of "
-                f"{', '.join(sorted(plain))}."
-            )
-        classes.append(ClassChange(**{**plain, **item}))
-    return Drift(years=values["years"], classes=tuple(classes))
+    values = read_values(path, "drift")
+    if isinstance(values, dict):  # a report has more
+        values = {key: values[key] for key in ("years", "classes") if key in values}
+    return read_table(Drift, values, f"drift {path}", error=InputError)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

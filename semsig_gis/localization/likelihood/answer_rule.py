@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Any, TypeGuard
+import sys
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from typing_extensions import TypedDict
 
-from semsig_gis.core import InputError, binomial_tail
+from semsig_gis.core import InputError, Range, binomial_tail, check_fields, read_table
 from semsig_gis.storage import parse_json, read_whole, whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from pathlib import Path
 
     from numpy.typing import ArrayLike
@@ -43,13 +43,8 @@ class RuleRecord(TypedDict):
     coverage: float
 
 
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, (int, float))
-
-
-def _check_share(name: str, value: object) -> None:
-    if not (_is_number(value) and 0 < value < 1):
-        raise InputError(f"{name} of the answers is {value!r}; give a share above 0 and below 1.")
+_Share = Annotated[float, Range("a share above 0 and below 1", 0, math.nextafter(1, 0), above=True)]
+_Count = Annotated[int, Range("a number of queries", 0, whole=True)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,23 +68,16 @@ class AnswerRule:
     True
     """
 
-    threshold: float
-    radius: float = 50.0
-    precision: float = 0.98
-    confidence: float = 0.95
-    queries: int = 0
-    answered: int = 0
-    wrong: int = 0
+    threshold: Annotated[float, Range("a chance, 0 or more", 0)]
+    radius: Annotated[float, Range("metres above 0", 0, sys.float_info.max, above=True)] = 50.0
+    precision: _Share = 0.98
+    confidence: _Share = 0.95
+    queries: _Count = 0
+    answered: _Count = 0
+    wrong: _Count = 0
 
     def __post_init__(self) -> None:  # noqa: D105
-        for name in ("precision", "confidence"):
-            _check_share(name, getattr(self, name))
-        if not (_is_number(self.threshold) and self.threshold >= 0):
-            raise InputError(
-                f"threshold of the answers is {self.threshold!r}; give a chance, 0 or more."
-            )
-        if not (_is_number(self.radius) and 0 < self.radius < math.inf):
-            raise InputError(f"radius of the answers is {self.radius!r}; give metres above 0.")
+        check_fields(self, "the answer rule")
         if not 0 <= self.wrong <= self.answered <= self.queries:
             raise InputError(
                 f"{self.wrong} wrong of {self.answered} answers to {self.queries} queries were "
@@ -189,8 +177,7 @@ def calibrate(
     >>> 0.38 < calibrate(masses, masses > 0.4).threshold < 0.42
     True
     """
-    for name, value in (("precision", precision), ("confidence", confidence)):
-        _check_share(name, value)
+    rule = AnswerRule(threshold=math.inf, radius=radius, precision=precision, confidence=confidence)
     chances = np.asarray(masses, dtype=np.float64)
     right = np.asarray(correct)
     if chances.shape != right.shape or chances.ndim != 1 or not np.isfinite(chances).all():
@@ -215,11 +202,9 @@ def calibrate(
             if binomial_tail(int(errors[end]), end + 1, 1.0 - precision) > allowed:
                 break
             best = max(best, end)
-    return AnswerRule(
+    return replace(
+        rule,
         threshold=float(ranked[best]) if best >= 0 else math.inf,
-        radius=radius,
-        precision=precision,
-        confidence=confidence,
         queries=len(ranked),
         answered=best + 1,
         wrong=int(errors[best]) if best >= 0 else 0,
@@ -278,14 +263,12 @@ def open_rule(path: str | Path) -> AnswerRule:
     0.9
     """
     try:
-        values: Mapping[str, Any] = parse_json(read_whole(path), finite=True)
-        names = {field.name for field in fields(AnswerRule)}
-        if not isinstance(values, dict) or not {"threshold"} <= set(values) <= names:
-            raise InputError(f"its fields are not exactly {', '.join(sorted(names))}")
-        threshold = values["threshold"]
-        return AnswerRule(**{**values, "threshold": math.inf if threshold is None else threshold})
-    except (OSError, TypeError, ValueError) as error:
+        values = parse_json(read_whole(path), finite=True)
+    except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error).rstrip(".")
         raise InputError(
-            f"answer rule {path} cannot be used ({reason}); give a file that save_rule wrote."
+            f"answer rule {path} cannot be read ({reason}); give a file that save_rule wrote."
         ) from error
+    if isinstance(values, dict) and values.get("threshold", 0) is None:
+        values["threshold"] = math.inf  # which JSON does not have
+    return read_table(AnswerRule, values, f"answer rule {path}", error=InputError)

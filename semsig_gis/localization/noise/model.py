@@ -8,26 +8,31 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from typing_extensions import TypedDict
 
 from semsig_gis.core import (
     HALF_TURN,
+    Accepts,
     Displayed,
+    Flag,  # noqa: TC001 - of fields
     InputError,
-    nearest_name,
+    Parsed,
+    Range,
+    check_fields,
+    length,
     percent,
+    read_table,
 )
 from semsig_gis.storage import read_values, toml_text, whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
 MOST_ERROR = 3.0
 MOST = 1000  # objects in a signature, and metres of the place
@@ -69,6 +74,38 @@ class MixtureRecord(TypedDict):
     name: str
     weights: list[float]
     specs: list[SpecRecord]
+
+
+def _check_shares(shares: Mapping[str, float]) -> Mapping[str, float]:
+    total = math.fsum(shares.values())
+    if shares and abs(total - 1.0) > ROUNDING:
+        raise InputError(f"the shares sum to {total:.6g}; give shares that sum to 1.")
+    return shares
+
+
+def _check_fading(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    distances = [distance for distance, _ in points]
+    if any(after <= before for before, after in pairwise(distances)):
+        raise ValueError
+    return points
+
+
+_Chance = Annotated[float, Range("a chance from 0 to 1", 0, 1)]
+_Weight = Annotated[float, Range("a chance above 0 and up to 1", 0, 1, above=True)]
+_Amount = Annotated[float, Range(f"a number from 0 to {MOST:,}", 0, MOST)]
+_Degrees = Annotated[float, Range("degrees above 0 and up to 180", 0, HALF_TURN, above=True)]
+_Error = Annotated[
+    float, Range(f"a number above 0 and up to {MOST_ERROR:g}", 0, MOST_ERROR, above=True)
+]
+_Shares = Annotated[Mapping[str, _Chance], Parsed(_check_shares)]
+_Fading = Annotated[
+    Sequence[Sequence[float]],
+    Parsed(
+        _check_fading,
+        Annotated[tuple[tuple[Annotated[float, Range("metres", 0)], _Chance], ...], length(1)],
+    ),
+    Accepts("pairs of metres, ascending, and a share from 0 to 1"),
+]
 
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
@@ -129,50 +166,30 @@ class NoiseSpec(Displayed):
     >>> NoiseSpec(detection=1.2)
     Traceback (most recent call last):
     ...
-    semsig_gis.core.errors.InputError: detection of the noise is 1.2; give a chance from 0 to 1.
+    semsig_gis.core.errors.InputError: the noise has detection = 1.2; write a chance from 0 to 1.
     """
 
-    detection: float = 0.9
-    detection_by_class: Mapping[str, float] = field(default_factory=dict)
-    misnamed: float = 0.05
-    misnamed_by_class: Mapping[str, float] = field(default_factory=dict)
-    confusion: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    clutter: float = 1.0
-    clutter_shares: Mapping[str, float] = field(default_factory=dict)
-    bearing_sigma: float = 5.0
-    bearing_sigma_by_class: Mapping[str, float] = field(default_factory=dict)
-    position_sigma: float = 0.0
-    missed_each: float = 0.0
-    misnamed_each: float = 0.0
-    range_sigma: float = 0.25
-    range_sigma_by_class: Mapping[str, float] = field(default_factory=dict)
-    fading: Mapping[str, Sequence[Sequence[float]]] = field(default_factory=dict)
-    repeat: float = 1.0
-    general: bool = False
+    detection: _Chance = 0.9
+    detection_by_class: Mapping[str, _Chance] = field(default_factory=dict)
+    misnamed: _Chance = 0.05
+    misnamed_by_class: Mapping[str, _Chance] = field(default_factory=dict)
+    confusion: Mapping[str, _Shares] = field(default_factory=dict)
+    clutter: _Amount = 1.0
+    clutter_shares: _Shares = field(default_factory=dict)
+    bearing_sigma: _Degrees = 5.0
+    bearing_sigma_by_class: Mapping[str, _Degrees] = field(default_factory=dict)
+    position_sigma: _Amount = 0.0
+    missed_each: _Amount = 0.0
+    misnamed_each: _Amount = 0.0
+    range_sigma: _Error = 0.25
+    range_sigma_by_class: Mapping[str, _Error] = field(default_factory=dict)
+    fading: Mapping[str, _Fading] = field(default_factory=dict)
+    repeat: _Chance = 1.0
+    general: Flag = False
     name: str = "custom"
 
     def __post_init__(self) -> None:  # noqa: D105
-        if not isinstance(self.name, str):
-            raise InputError(f"name of the noise model is {self.name!r}; give a text.")
-        if not isinstance(self.general, bool):
-            raise InputError(f"general of the noise is {self.general!r}; give true or false.")
-        for label, number in _NUMBERS.items():
-            number.check(label, getattr(self, label))
-        for label in BY_CLASS:
-            number = _NUMBERS[label.removesuffix("_by_class")]
-            for name, value in _table(label, getattr(self, label)).items():
-                number.check(f"{label} {name!r}", value)
-        for name, row in _table("confusion", self.confusion).items():
-            _check_shares(f"confusion row {name!r}", _table(f"confusion row {name!r}", row))
-        for name, points in _table("fading", self.fading).items():
-            _check_fading(name, points)
-        fading = {
-            name: tuple((float(metres), float(share)) for metres, share in points)
-            for name, points in self.fading.items()
-        }
-        object.__setattr__(self, "fading", fading)
-        if _table("clutter_shares", self.clutter_shares):
-            _check_shares("clutter_shares", self.clutter_shares)
+        check_fields(self, "the noise")
 
     def _facts(self) -> dict[str, object]:
         tables = (*BY_CLASS, "confusion", "clutter_shares", "fading")
@@ -236,20 +253,19 @@ class NoiseMixture(Displayed):
     """
 
     specs: tuple[NoiseSpec, ...]
-    weights: tuple[float, ...]
+    weights: tuple[_Weight, ...]
     name: str = "custom"
 
     def __post_init__(self) -> None:  # noqa: D105
+        check_fields(self, "the mixture of noise models")
         if not self.specs or len(self.specs) != len(self.weights):
             raise InputError(
                 f"{len(self.specs)} noise models and {len(self.weights)} weights were given; "
                 "give at least one model and one weight for each."
             )
-        weights = {f"{number}": weight for number, weight in enumerate(self.weights, start=1)}
-        _check_shares("weights of the mixture", weights)
-        if not all(weight > 0 for weight in self.weights):
+        if abs(math.fsum(self.weights) - 1.0) > ROUNDING:
             raise InputError(
-                f"weights of the mixture are {self.weights}; leave out models without weight."
+                f"weights of the mixture are {self.weights}; give chances that sum to 1."
             )
 
     def _facts(self) -> dict[str, object]:
@@ -283,36 +299,14 @@ Noise = NoiseSpec | NoiseMixture
 """Any noise model."""
 
 
-def noise_from_dict(values: Mapping[str, Any]) -> Noise:
-    """Read a noise model from plain values, the inverse of ``to_dict``.
+def noise_from_dict(values: Mapping[str, Any], *, where: str = "the noise") -> Noise:
+    """Read a noise model from plain values, the inverse of ``to_dict``; messages name it `where`.
 
     Values are the fields of `NoiseSpec`, all optional, or of a mixture of plain models.
     """
-    if not isinstance(values, Mapping):
-        raise InputError(f"a noise model is {values!r}; give a table of its fields.")
-    kind = NoiseMixture if "specs" in values else NoiseSpec
-    labels = [item.name for item in fields(kind)]
-    for name in values:
-        if name not in labels:
-            hint = nearest_name(str(name), labels)
-            raise InputError(
-                f"a noise model has no field {name!r}{hint}; its fields are {', '.join(labels)}."
-            )
-    if kind is NoiseSpec:
-        return NoiseSpec(**values)
-    try:
-        models = list(map(noise_from_dict, values["specs"]))
-        weights = tuple(map(float, values["weights"]))
-    except InputError:
-        raise
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"a mixture of noise models cannot be used ({error}); give lists specs and weights."
-        ) from error
-    specs = tuple(model for model in models if isinstance(model, NoiseSpec))
-    if len(specs) < len(models):
-        raise InputError("a mixture of noise models contains another mixture; give plain models.")
-    return NoiseMixture(**{**values, "specs": specs, "weights": weights})
+    if isinstance(values, dict) and "specs" in values:
+        return read_table(NoiseMixture, values, where, error=InputError)
+    return read_table(NoiseSpec, values, where, error=InputError)
 
 
 def cell_noise(noise: Noise, step: float) -> Noise:
@@ -365,77 +359,6 @@ def place_noise(noise: Noise, step: float) -> Noise:
     return noise.changed(narrowed)
 
 
-@dataclass(frozen=True, slots=True)
-class _Number:
-    """A kind of number: its description, and a test that NaN and infinity fail."""
-
-    words: str
-    fits: Callable[[float], bool]
-
-    def check(self, label: str, value: object) -> None:
-        """Raise InputError for any other value."""
-        number = value if isinstance(value, (int, float)) else math.nan
-        if isinstance(value, bool) or not self.fits(number):
-            raise InputError(f"{label} of the noise is {value!r:.40}; give {self.words}.")
-
-
-_CHANCE = _Number("a chance from 0 to 1", lambda value: 0 <= value <= 1)
-_AMOUNT = _Number(f"a number from 0 to {MOST:,}", lambda value: 0 <= value <= MOST)
-_DEGREES = _Number("degrees above 0 and up to 180", lambda value: 0 < value <= HALF_TURN)
-
-
-_NUMBERS = MappingProxyType(
-    {
-        "detection": _CHANCE,
-        "misnamed": _CHANCE,
-        "repeat": _CHANCE,
-        "clutter": _AMOUNT,
-        "bearing_sigma": _DEGREES,
-        "position_sigma": _AMOUNT,
-        "missed_each": _AMOUNT,
-        "misnamed_each": _AMOUNT,
-        "range_sigma": _Number(
-            "a number above 0 and up to 3", lambda value: 0 < value <= MOST_ERROR
-        ),
-    }
-)
-
-
-def _check_fading(name: str, points: object) -> None:
-    """Raise InputError for an invalid table of shares by distance."""
-    try:
-        table = np.array(points, dtype=np.float64)
-    except (TypeError, ValueError):
-        table = np.empty(0)
-    fits = table.ndim == 2 and table.shape[1] == 2 and len(table)  # noqa: PLR2004 - pairs
-    if fits:
-        metres, shares = table.T
-        fits = (np.diff(metres, prepend=-1e-9) > 0).all() and ((shares >= 0) & (shares <= 1)).all()
-    if not fits:
-        raise InputError(
-            f"fading of the noise for {name!r} is {points!r:.60}; give pairs of metres, ascending, "
-            "and a share from 0 to 1."
-        )
-
-
-def _check_shares(label: str, shares: Mapping[str, float]) -> None:
-    """Raise InputError for shares that are not chances or do not sum to one."""
-    for name, value in shares.items():
-        _CHANCE.check(f"{label}, {name!r},", value)
-    total = math.fsum(shares.values())
-    if abs(total - 1.0) > ROUNDING:
-        raise InputError(f"{label} of the noise sums to {total:.6g}; give shares that sum to 1.")
-
-
-def _table(label: str, value: object) -> Mapping[str, Any]:
-    """Return a mapping by class; raise InputError for any other value."""
-    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
-        raise InputError(
-            f"{label} of the noise is {value!r}; give a table by the names of the classes."
-        )
-    return value
-
-
 def _plain(value: Any) -> Any:  # noqa: ANN401
     """Return a copy with all mappings as dictionaries and all sequences as lists."""
     if isinstance(value, Mapping):
@@ -447,7 +370,7 @@ def _plain(value: Any) -> Any:  # noqa: ANN401
 
 def open_noise(path: str | Path) -> Noise:
     """Read a noise model from a JSON file, or a TOML file with the suffix ``.toml``."""
-    return noise_from_dict(read_values(path, "noise"))
+    return noise_from_dict(read_values(path, "noise"), where=f"noise file {path}")
 
 
 def save_noise(noise: Noise, path: str | Path) -> None:

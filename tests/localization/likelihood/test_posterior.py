@@ -390,7 +390,7 @@ def test_a_rule_is_saved_and_opened(tmp_path: Path, threshold: float) -> None:
 )
 def test_damaged_rules_are_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "rule.json").write_text(text)
-    with refused(InputError, "rule.json", "save_rule"):
+    with refused(InputError, "answer rule", "rule.json"):
         open_rule(tmp_path / "rule.json")
     with refused(InputError, "none.json", "No such file"):
         open_rule(tmp_path / "none.json")

@@ -39,30 +39,39 @@ if TYPE_CHECKING:
 @pytest.mark.parametrize(
     ("values", "fault"),
     [
-        ({"detection": -0.1}, "detection of the noise is -0.1; give a chance from 0 to 1."),
-        ({"detection": True}, "detection of the noise is True"),
-        ({"misnamed": float("nan")}, "misnamed of the noise is nan"),
-        ({"clutter": -1}, "clutter of the noise is -1; give a number from 0"),
-        ({"bearing_sigma": 0}, "bearing_sigma of the noise is 0; give degrees above 0"),
+        ({"detection": -0.1}, "the noise has detection = -0.1; write a chance from 0 to 1."),
+        ({"detection": True}, "the noise has detection = True"),
+        ({"misnamed": float("nan")}, "the noise has misnamed = nan"),
+        ({"clutter": -1}, "the noise has clutter = -1; write a number from 0"),
+        ({"bearing_sigma": 0}, "the noise has bearing_sigma = 0; write degrees above 0"),
         ({"bearing_sigma": 200}, "up to 180"),
-        ({"position_sigma": float("inf")}, "position_sigma of the noise is inf"),
-        ({"detection_by_class": {"bench": 2}}, "detection_by_class 'bench' of the noise is 2"),
-        ({"detection_by_class": 0.5}, "give a table by the names of the classes"),
+        ({"position_sigma": float("inf")}, "the noise has position_sigma = inf"),
+        ({"detection_by_class": {"bench": 2}}, "the noise, detection_by_class has bench = 2"),
+        ({"detection_by_class": 0.5}, "has detection_by_class = 0.5; write a table"),
         (
             {"confusion": {"bench": {"bench": 0.9}}},
-            "confusion row 'bench' of the noise sums to 0.9",
+            "the noise, confusion, bench: the shares sum to 0.9",
         ),
-        ({"confusion": {"bench": {"bench": -1, "bus_stop": 2}}}, "is -1; give a chance"),
-        ({"confusion": {"bench": 1}}, "give a table by the names of the classes"),
-        ({"clutter_shares": {"bench": 0.4}}, "clutter_shares of the noise sums to 0.4"),
-        ({"detecton": 0.4}, "no field 'detecton'; the nearest is 'detection'"),
-        ({"name": 3}, "give a text"),
-        ({"specs": []}, "a mixture of noise models cannot be used"),
+        (
+            {"confusion": {"bench": {"bench": -1, "bus_stop": 2}}},
+            "confusion, bench has bench = -1; write a chance",
+        ),
+        ({"confusion": {"bench": 1}}, "confusion has bench = 1; write a table"),
+        ({"clutter_shares": {"bench": 0.4}}, "clutter_shares: the shares sum to 0.4"),
+        ({"detecton": 0.4}, "the key 'detecton', which is unknown; the nearest is 'detection'"),
+        ({"name": 3}, "the noise has name = 3; write a string"),
+        ({"specs": []}, "the noise lacks the key 'weights'"),
         ({"specs": [], "weights": []}, "give at least one model"),
-        ({"specs": [{}], "weights": [0.5]}, "weights of the mixture of the noise sums to 0.5"),
-        ({"specs": [{}, {}], "weights": [1.0, 0.0]}, "leave out models without weight"),
-        ({"specs": [{"specs": [{}], "weights": [1]}], "weights": [1]}, "another mixture"),
-        ({"specs": [{"clutter": -1}], "weights": [1]}, "clutter of the noise is -1"),
+        (
+            {"specs": [{}], "weights": [0.5]},
+            "weights of the mixture are (0.5,); give chances that sum to 1",
+        ),
+        ({"specs": [{}, {}], "weights": [1.0, 0.0]}, "weight 2 is 0.0; write a chance above 0"),
+        (
+            {"specs": [{"specs": [{}], "weights": [1]}], "weights": [1]},
+            "spec 1 has the key 'specs', which is unknown",
+        ),
+        ({"specs": [{"clutter": -1}], "weights": [1]}, "spec 1 has clutter = -1"),
     ],
 )
 def test_invalid_models_are_refused(values: dict[str, object], fault: str) -> None:
@@ -96,7 +105,10 @@ def test_a_cell_widens_the_noise_of_a_place(sigma: float) -> None:
 
 def test_a_file_and_a_name_without_a_model_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "noise.json"
-    for text, word in (("{", "noise.json cannot be read"), ("[1]", "a table of its fields")):
+    for text, word in (
+        ("{", "noise.json cannot be read"),
+        ("[1]", "noise.json is [1]; write a table"),
+    ):
         file.write_text(text)
         with refused(InputError, word):
             open_noise(file)
