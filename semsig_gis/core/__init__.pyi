@@ -56,9 +56,7 @@ from .geometry import wrap_degrees as wrap_degrees
 from .inputs import Accepts as Accepts
 from .inputs import FileTable as FileTable
 from .inputs import Flag as Flag
-from .inputs import Matching as Matching
 from .inputs import Parsed as Parsed
-from .inputs import Range as Range
 from .inputs import Scalar as Scalar
 from .inputs import Text as Text
 from .inputs import Texts as Texts
@@ -67,7 +65,9 @@ from .inputs import check_fields as check_fields
 from .inputs import file_key as file_key
 from .inputs import json_schema as json_schema
 from .inputs import length as length
+from .inputs import matching as matching
 from .inputs import metres as metres
+from .inputs import number as number
 from .inputs import pairs as pairs
 from .inputs import read_table as read_table
 from .jit import compiled as compiled

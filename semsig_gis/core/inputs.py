@@ -60,55 +60,21 @@ class FileTable(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
 class Accepts:
-    """What a message says of the values of a type, such as "a list of texts"."""
+    """What a message says of the values of a type, or of a schema of pydantic in its place."""
 
     words: str
+    schema: CoreSchema | None = None
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Replace the errors of the type by one with the words."""
-        return _with_words(handler(source), self.words)
-
-
-@dataclasses.dataclass(frozen=True, slots=True)
-class Matching:
-    """A text that matches a regular expression as a whole, described by `words`."""
-
-    pattern: str
-    words: str
-
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Return the schema of the text."""
-        return _with_words(core_schema.str_schema(pattern=f"^{self.pattern}$"), self.words)
-
-
-@dataclasses.dataclass(frozen=True, slots=True)
-class Range:
-    """A number from `least` to `most`, or only `above` it, described by `words`; `whole` or not.
-
-    A bool is not a number. NaN is never accepted, infinity only without a limit.
-    """
-
-    words: str
-    least: float
-    most: float | None = None
-    above: bool = False
-    whole: bool = False
-
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Return the schema of the number."""
-        schema: dict[str, Any] = {"type": "int" if self.whole else "float", "strict": True}
-        schema["gt" if self.above else "ge"] = self.least
-        if self.most is not None:
-            schema["le"] = self.most
-        return _with_words(schema, self.words)
+        schema = handler(source) if self.schema is None else self.schema
+        return core_schema.custom_error_schema(
+            schema, custom_error_type="accepts", custom_error_message=self.words
+        )
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -129,15 +95,31 @@ class Parsed:
         return core_schema.no_info_after_validator_function(self.parse, schema)
 
 
-def _with_words(schema: Any, words: str) -> CoreSchema:  # noqa: ANN401 - pydantic's own types
-    return core_schema.custom_error_schema(
-        schema, custom_error_type="accepts", custom_error_message=words
-    )
+def number(
+    words: str,
+    least: float,
+    most: float | None = None,
+    *,
+    above: bool = False,
+    whole: bool = False,
+) -> Accepts:
+    """Return the type of a number from `least`, or only `above` it, to `most`; `whole` or not.
+
+    A bool is not a number. NaN is never accepted, infinity only without a limit.
+    """
+    bounds: dict[str, Any] = {"gt" if above else "ge": least, "le": most}
+    make = core_schema.int_schema if whole else core_schema.float_schema
+    return Accepts(words, make(strict=True, **bounds))
 
 
-def metres(most: float) -> Range:
+def metres(most: float) -> Accepts:
     """Return the type of a length above 0 and up to `most` metres."""
-    return Range(f"metres above 0 and up to {most:g}", 0, most, above=True)
+    return number(f"metres above 0 and up to {most:g}", 0, most, above=True)
+
+
+def matching(pattern: str, words: str) -> Accepts:
+    """Return the type of a text that matches a regular expression as a whole."""
+    return Accepts(words, core_schema.str_schema(pattern=f"^{pattern}$"))
 
 
 def file_key(name: str) -> Any:  # noqa: ANN401 - pydantic's own type

@@ -10,7 +10,7 @@ import numpy as np
 
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import CatalogError, UnknownNameError, nearest_name
-from semsig_gis.core.inputs import Matching, Range, check_fields, metres
+from semsig_gis.core.inputs import check_fields, matching, metres, number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -56,9 +56,9 @@ class ObjectClass:
     'D'
     """
 
-    code: Annotated[int, Range("a whole number from 1 to 255", 1, MAX_CODE, whole=True)]
-    symbol: Annotated[str, Matching("[A-Za-z0-9]", "one ASCII letter or digit")]
-    name: Annotated[str, Matching("[a-z][a-z0-9_]*", "lower-case letters, digits and underscores")]
+    code: Annotated[int, number("a whole number from 1 to 255", 1, MAX_CODE, whole=True)]
+    symbol: Annotated[str, matching("[A-Za-z0-9]", "one ASCII letter or digit")]
+    name: Annotated[str, matching("[a-z][a-z0-9_]*", "lower-case letters, digits and underscores")]
     title: str
     range_m: Annotated[float, metres(MAX_RANGE_M)] | None = None
     height_m: Annotated[float, metres(MAX_HEIGHT_M)] | None = None

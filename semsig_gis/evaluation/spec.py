@@ -5,14 +5,22 @@ from __future__ import annotations
 import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from semsig_gis.core import CatalogError, InputError
+from semsig_gis.core import (
+    Accepts,
+    CatalogError,
+    FileTable,
+    InputError,
+    Whole,
+    pairs,
+    read_table,
+)
 from semsig_gis.evaluation.file import used_noises
 from semsig_gis.evaluation.queries.distortion_text import chain_text, parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec
 from semsig_gis.localization import NOISES, noise_from_dict, open_noise, parse_method
-from semsig_gis.storage import check_keys, parse_toml, read_text, toml_text
+from semsig_gis.storage import parse_toml, read_text, toml_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,20 +28,6 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
     from semsig_gis.evaluation.queries.draw import SeenFrom
     from semsig_gis.localization import AnyMethod, Noise
-
-KEYS = {
-    "database": str,
-    "queries": int,
-    "seeds": list,
-    "seen_from": str,
-    "city": str,
-    "top": list,
-    "methods": dict,
-    "distortions": dict,
-    "noises": dict,
-    "districts": dict,
-}
-DISTRICT_KEYS = {"file": str, "name": str}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +53,28 @@ class Case:
     def name(self) -> str:
         """Name of the evaluation, and of its folder."""
         return f"{self.distortion}/{self.method}-top{self.top}"
+
+
+_WholeNumbers = Annotated[tuple[Whole, ...], Accepts("a list of whole numbers")]
+_Chain = Annotated[str | tuple[str, ...], Accepts("a text or a list of texts")]
+
+
+class _ExperimentFile(FileTable):
+    """The keys of a file; those that it lacks have the defaults of `ExperimentSpec`."""
+
+    database: str
+    methods: dict[str, str]
+    distortions: dict[str, _Chain]
+    queries: Whole = 0
+    seeds: _WholeNumbers = ()
+    seen_from: str = ""
+    city: str = ""
+    top: _WholeNumbers = ()
+    districts: Districts | None = None
+    noises: Annotated[
+        tuple[tuple[str, Any], ...],
+        pairs(Annotated[str | dict[str, Any], Accepts("a table or the name of a file")]),
+    ] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,29 +213,23 @@ def parse_experiment(
     value is not valid.
     """
     try:
-        values = parse_toml(text, where)
-        check_keys(values, KEYS, where, ["database", "methods", "distortions"])
-        methods, districts = values.pop("methods"), values.pop("districts", None)
-        check_keys(methods, dict.fromkeys(methods, str), f"{where}, methods")
-        if districts is not None:
-            check_keys(districts, DISTRICT_KEYS, f"{where}, districts", DISTRICT_KEYS)
+        file = read_table(_ExperimentFile, parse_toml(text, where), where, error=InputError)
     except CatalogError as error:
         raise InputError(str(error)) from error
     noises = {**NOISES}
-    for name, noise in values.pop("noises", {}).items():
-        noises[name] = _noise(name, noise, where, Path(folder))
-    for name in ("seeds", "top"):
-        if name in values:
-            values[name] = _whole_numbers(values[name], name, where)
-    distortions = {
-        name: parse_chain(_chain(chain, name, where), noises=noises)
-        for name, chain in values.pop("distortions").items()
+    for name, noise in file.noises:
+        place = f"{where}, noises, {name}"
+        values = open_noise(Path(folder, noise)).to_dict() if isinstance(noise, str) else noise
+        noises[name] = noise_from_dict({**values, "name": name}, where=place)
+    chains = {
+        name: chain if isinstance(chain, str) else ", ".join(chain)
+        for name, chain in file.distortions.items()
     }
+    keys = file.model_fields_set - {"methods", "distortions", "noises"}
     return ExperimentSpec(
-        methods={name: parse_method(text, noises=noises) for name, text in methods.items()},
-        distortions=distortions,
-        districts=None if districts is None else Districts(**districts),
-        **values,
+        methods={name: parse_method(text, noises=noises) for name, text in file.methods.items()},
+        distortions={name: parse_chain(chain, noises=noises) for name, chain in chains.items()},
+        **{key: getattr(file, key) for key in keys},
     )
 
 
@@ -264,32 +274,3 @@ def open_experiment_spec(path: str | Path) -> ExperimentSpec:
             f"experiment {file} cannot be read ({reason}); give a TOML file."
         ) from error
     return parse_experiment(text, where=str(file), folder=file.parent)
-
-
-def _noise(name: str, noise: object, where: str, folder: Path) -> Noise:
-    """Return the noise model of a table or of a file, with the given name."""
-    if isinstance(noise, str):
-        values: Mapping[str, Any] = open_noise(folder / noise).to_dict()
-    elif isinstance(noise, dict):
-        values = noise
-    else:
-        raise InputError(
-            f"{where} has {name} = {noise!r} in noises; write a table or the name of a file."
-        )
-    return noise_from_dict({**values, "name": name})
-
-
-def _chain(chain: object, name: str, where: str) -> str:
-    texts: list[Any] = chain if isinstance(chain, list) else [chain]
-    if not all(isinstance(text, str) for text in texts):
-        raise InputError(
-            f"{where} has {name} = {chain!r} in distortions; write a text or a list of texts."
-        )
-    return ", ".join(texts)
-
-
-def _whole_numbers(items: list[object], key: str, where: str) -> tuple[int, ...]:
-    # In Python, True is an int; here it is an error.
-    if not all(type(item) is int for item in items):
-        raise InputError(f"{where} has {key} = {items!r}; write a list of whole numbers.")
-    return tuple(item for item in items if isinstance(item, int))

@@ -18,7 +18,7 @@ from semsig_gis.core import (
     CatalogError,
     CrsError,
     InputError,
-    Range,
+    number,
 )
 from semsig_gis.objects.table import Licence, StreetObjects, join_licences, layer_note
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 IDENTIFIER = [SOURCE, SOURCE_ID]
 CLASS_AND_PLACE = [CLASS_CODE, "x", "y"]
-_Count = Annotated[int, Range("a whole number, 0 or more", 0, whole=True)]
+_Count = Annotated[int, number("a whole number, 0 or more", 0, whole=True)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +49,7 @@ class ClassChange:
     added: _Count = 0
     removed: _Count = 0
     moved: _Count = 0
-    moved_m: Annotated[float, Range("metres, 0 or more", 0, MOST_METRES)] | None = None
+    moved_m: Annotated[float, number("metres, 0 or more", 0, MOST_METRES)] | None = None
     gained: _Count = 0
     lost: _Count = 0
 

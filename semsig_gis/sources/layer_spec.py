@@ -13,13 +13,13 @@ from semsig_gis.core import (
     CatalogError,
     Flag,  # noqa: TC001 - of fields, as the next
     Parsed,
-    Range,
     Scalar,
     Text,
     Texts,
     file_key,
     length,
     metres,
+    number,
     pairs,
 )
 from semsig_gis.sources.filters import COMPARES, Condition, Rules, Value  # noqa: TC001
@@ -88,7 +88,7 @@ _Tags = Annotated[
     tuple[tuple[str, tuple[str, ...]], ...],
     Parsed(_tags, Annotated[dict[str, _Tag], length(1)]),
 ]
-_Count = Annotated[int, Range("a number of rows", 0, whole=True)]
+_Count = Annotated[int, number("a number of rows", 0, whole=True)]
 _Width = Annotated[float, metres(MAX_WIDTH_M)]
 
 

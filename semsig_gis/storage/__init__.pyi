@@ -40,12 +40,8 @@ from .text import MAX_TEXT_BYTES as MAX_TEXT_BYTES
 from .text import parse_json as parse_json
 from .text import read_text as read_text
 from .text import read_whole as read_whole
-from .toml import check_keys as check_keys
-from .toml import metres as metres
-from .toml import one_of as one_of
 from .toml import parse_toml as parse_toml
 from .toml import read_values as read_values
-from .toml import texts as texts
 from .toml import toml_text as toml_text
 from .whole import exchange as exchange
 from .whole import folder_locked as folder_locked

@@ -6,7 +6,6 @@ Wrong TOML files are tested with catalogues.
 from __future__ import annotations
 
 import json
-import math
 import os
 import sys
 import tomllib
@@ -17,10 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core import CatalogError, InputError
+from semsig_gis.core import InputError
 from semsig_gis.storage import (
     MAX_TEXT_BYTES,
-    metres,
     parse_json,
     parse_rows,
     read_rows,
@@ -99,16 +97,6 @@ def test_values_after_tables_belong_to_the_right_section() -> None:
     text = toml_text({**table, "parts": {}})  # an empty table is omitted
     assert text.startswith("queries = 3\n\n[noises.mine]\nclutter = 2.0\n")
     assert tomllib.loads(text) == table
-
-
-@given(st.floats() | st.integers() | st.booleans() | st.text() | st.none())
-def test_metres_are_above_0_and_up_to_the_limit(value: object) -> None:
-    number = not isinstance(value, bool) and isinstance(value, int | float)
-    if number and 0 < value <= 100:  # type: ignore[operator]
-        assert math.isclose(metres(value, "a", "a.toml", most=100), float(value))  # type: ignore[arg-type]
-        return
-    with pytest.raises(CatalogError, match="metres above 0 and up to 100"):
-        metres(value, "a", "a.toml", most=100)
 
 
 # --- Rows -------------------------------------------------------------------------------------

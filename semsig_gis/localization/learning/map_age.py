@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from semsig_gis.core import Displayed, InputError, Range, check_fields, read_table
+from semsig_gis.core import Displayed, InputError, check_fields, number, read_table
 from semsig_gis.localization.learning.fit import LEAST, MOST, shrunk_rates
 from semsig_gis.objects import ClassChange  # noqa: TC001 - of fields
 from semsig_gis.sources import data_folder
@@ -51,7 +51,7 @@ class Drift(Displayed):
     1.24
     """
 
-    years: Annotated[float, Range("years above 0 and up to 100", 0, MOST_YEARS, above=True)]
+    years: Annotated[float, number("years above 0 and up to 100", 0, MOST_YEARS, above=True)]
     classes: tuple[ClassChange, ...]
 
     def __post_init__(self) -> None:  # noqa: D105

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from typing_extensions import TypedDict
 
-from semsig_gis.core import InputError, Range, binomial_tail, check_fields, read_table
+from semsig_gis.core import InputError, binomial_tail, check_fields, number, read_table
 from semsig_gis.storage import parse_json, read_whole, whole_file
 
 if TYPE_CHECKING:
@@ -43,8 +43,10 @@ class RuleRecord(TypedDict):
     coverage: float
 
 
-_Share = Annotated[float, Range("a share above 0 and below 1", 0, math.nextafter(1, 0), above=True)]
-_Count = Annotated[int, Range("a number of queries", 0, whole=True)]
+_Share = Annotated[
+    float, number("a share above 0 and below 1", 0, math.nextafter(1, 0), above=True)
+]
+_Count = Annotated[int, number("a number of queries", 0, whole=True)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,8 +70,8 @@ class AnswerRule:
     True
     """
 
-    threshold: Annotated[float, Range("a chance, 0 or more", 0)]
-    radius: Annotated[float, Range("metres above 0", 0, sys.float_info.max, above=True)] = 50.0
+    threshold: Annotated[float, number("a chance, 0 or more", 0)]
+    radius: Annotated[float, number("metres above 0", 0, sys.float_info.max, above=True)] = 50.0
     precision: _Share = 0.98
     confidence: _Share = 0.95
     queries: _Count = 0

@@ -23,9 +23,9 @@ from semsig_gis.core import (
     Flag,  # noqa: TC001 - of fields
     InputError,
     Parsed,
-    Range,
     check_fields,
     length,
+    number,
     percent,
     read_table,
 )
@@ -90,19 +90,19 @@ def _check_fading(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float,
     return points
 
 
-_Chance = Annotated[float, Range("a chance from 0 to 1", 0, 1)]
-_Weight = Annotated[float, Range("a chance above 0 and up to 1", 0, 1, above=True)]
-_Amount = Annotated[float, Range(f"a number from 0 to {MOST:,}", 0, MOST)]
-_Degrees = Annotated[float, Range("degrees above 0 and up to 180", 0, HALF_TURN, above=True)]
+_Chance = Annotated[float, number("a chance from 0 to 1", 0, 1)]
+_Weight = Annotated[float, number("a chance above 0 and up to 1", 0, 1, above=True)]
+_Amount = Annotated[float, number(f"a number from 0 to {MOST:,}", 0, MOST)]
+_Degrees = Annotated[float, number("degrees above 0 and up to 180", 0, HALF_TURN, above=True)]
 _Error = Annotated[
-    float, Range(f"a number above 0 and up to {MOST_ERROR:g}", 0, MOST_ERROR, above=True)
+    float, number(f"a number above 0 and up to {MOST_ERROR:g}", 0, MOST_ERROR, above=True)
 ]
 _Shares = Annotated[Mapping[str, _Chance], Parsed(_check_shares)]
 _Fading = Annotated[
     Sequence[Sequence[float]],
     Parsed(
         _check_fading,
-        Annotated[tuple[tuple[Annotated[float, Range("metres", 0)], _Chance], ...], length(1)],
+        Annotated[tuple[tuple[Annotated[float, number("metres", 0)], _Chance], ...], length(1)],
     ),
     Accepts("pairs of metres, ascending, and a share from 0 to 1"),
 ]

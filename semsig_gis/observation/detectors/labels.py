@@ -7,28 +7,63 @@ import functools
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from semsig_gis.core import (
     MAX_HEIGHT_M,
+    Accepts,
     CatalogError,
+    FileTable,
+    Flag,  # noqa: TC001 - of fields, as the next
     InputError,
+    Parsed,
+    Texts,  # noqa: TC001
     UnknownNameError,
     check_height,
+    file_key,
+    metres,
     nearest_name,
+    number,
+    pairs,
+    read_table,
 )
 from semsig_gis.sources import built_in_taxonomy, class_code, data_folder
-from semsig_gis.storage import check_keys, metres, parse_toml, read_text, texts
+from semsig_gis.storage import parse_toml, read_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
     from importlib.resources.abc import Traversable
 
     from semsig_gis.core import Taxonomy
 
-MAP_KEYS = {"labels": dict, "left_out": list}
-MEANING_KEYS = {"class": object, "part": bool, "height_m": object, "height_sigma": object}
 ROUNDING = 1e-6
+
+
+def _shares(entry: str | dict[str, float]) -> tuple[tuple[str, float], ...]:
+    """Return classes with their chances; ValueError if these do not fit each other."""
+    shares = {entry: 1.0} if isinstance(entry, str) else entry
+    if not shares or sum(shares.values()) > 1 + ROUNDING:
+        raise ValueError
+    return tuple(shares.items())
+
+
+class _LabelFile(FileTable):
+    labels: Annotated[tuple[tuple[str, Any], ...], pairs(Any)] = ()
+    left_out: Texts = ()
+
+
+class _Label(FileTable):
+    classes: Annotated[
+        tuple[tuple[str, float], ...],
+        Parsed(_shares, str | dict[str, Annotated[float, number("a chance", 0, 1, above=True)]]),
+        Accepts(
+            "the name of a class, or a table of classes with their chances, which sum to 1 at most"
+        ),
+        file_key("class"),
+    ]
+    part: Flag = False
+    height_m: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
+    height_sigma: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,34 +82,19 @@ class Meaning:
     @classmethod
     def parse(cls, value: object, where: str, classes: set[str]) -> Self:
         """Parse an entry of a map; CatalogError if it is not valid."""
-        item: Mapping[str, Any] = value if isinstance(value, dict) else {"class": value}
-        check_keys(item, MEANING_KEYS, where, ("class",))
-        entry = item["class"]
-        shares = {entry: 1.0} if isinstance(entry, str) else entry
-        numbers = isinstance(shares, dict) and all(
-            isinstance(share, int | float) and not isinstance(share, bool) and 0 < share <= 1
-            for share in shares.values()
-        )
-        if not shares or not numbers or sum(shares.values()) > 1 + ROUNDING:
-            raise CatalogError(
-                f"{where} has class = {entry!r}; write the name of a class, or a table of classes "
-                "with their chances, which sum to 1 at most."
-            )
-        for name in shares:
+        label = read_table(_Label, value if isinstance(value, dict) else {"class": value}, where)
+        for name, _ in label.classes:
             if name not in classes:
                 raise CatalogError(
                     f"{where} has the class {name!r}, which is unknown"
                     f"{nearest_name(name, classes)}."
                 )
-        height, sigma = (
-            metres(item[key], key, where, most=MAX_HEIGHT_M) if key in item else None
-            for key in ("height_m", "height_sigma")
-        )
+        height, sigma = label.height_m, label.height_sigma
         check_height(height, sigma, where)
         return cls(
-            tuple((name, float(share)) for name, share in shares.items()),
+            label.classes,
             None if height is None or sigma is None else (height, sigma),
-            part=item.get("part", False),
+            part=label.part,
         )
 
 
@@ -137,14 +157,12 @@ class LabelMap:
                     f"label map {name} cannot be read ({reason}); give a TOML file."
                 ) from error
             where = f"label map {name}"
-            content = parse_toml(text, where)
-            check_keys(content, MAP_KEYS, where)
+            content = read_table(_LabelFile, parse_toml(text, where), where)
             meanings += [
                 (label, Meaning.parse(value, f"{where}, label {label!r}", classes))
-                for label, value in content.get("labels", {}).items()
+                for label, value in content.labels
             ]
-            left_out = texts(content.get("left_out", []), "left_out", where)
-            meanings += [(label, NO_OBJECT) for label in left_out]
+            meanings += [(label, NO_OBJECT) for label in content.left_out]
         return cls(tuple(meanings), taxonomies)
 
     def find(self, label: str) -> Meaning | None:
