@@ -57,7 +57,7 @@ class FileTable(BaseModel):
     Its fields may be dataclasses, in which other keys are errors, too.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)

@@ -41,12 +41,6 @@ if TYPE_CHECKING:
 # TOML files in the same folder that are not catalogues: classes, keywords and more.
 NO_CATALOGS = frozenset({"drift", "geofabrik", "keywords", "taxonomy"})
 MEASURES = ("range_m", "height_m", "height_sigma")
-PLAIN_KEYS = frozenset(
-    {
-        *("name", "title", "place", "url", "license", "attribution", "metric_crs", "reader"),
-        *("endpoints", "token", "geocoder"),
-    }
-)
 MAX_MERGING_M = 100.0
 
 
@@ -339,7 +333,7 @@ def data_folder() -> Traversable:
 
 def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     where = f"catalogue {where}"
-    file = read_table(CatalogFile, _with_inherited(content, where), where)
+    file = read_table(CatalogFile, _with_inherited(content), where)
     place = where
     try:
         taxonomy = paper_taxonomy().extended(file.classes)
@@ -365,12 +359,12 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     double = next((name for name in names if names.count(name) > 1), None)
     if double is not None:
         raise CatalogError(f"{where} has two layers named {double!r}; rename one.")
-    return Catalog(
-        **{name: getattr(file, name) for name in file.model_fields_set & PLAIN_KEYS},
-        taxonomy=taxonomy,
-        layers=tuple(dataclasses.replace(spec, reader=file.reader) for spec in file.layers),
-        conflate=file.conflate,
-    )
+    keys = file.model_fields_set & {field.name for field in dataclasses.fields(Catalog)}
+    values = {key: getattr(file, key) for key in keys} | {
+        "taxonomy": taxonomy,
+        "layers": tuple(dataclasses.replace(spec, reader=file.reader) for spec in file.layers),
+    }
+    return Catalog(**values)
 
 
 def catalog_schema() -> dict[str, Any]:
@@ -382,26 +376,21 @@ def catalog_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _with_inherited(content: dict[str, Any], where: str) -> dict[str, Any]:
+def _with_inherited(content: dict[str, Any]) -> dict[str, Any]:
     """Return a catalogue, its layers with the values that they inherit from it."""
     layers: object = content.get("layers")
     if not isinstance(layers, list):
         return content
     shared = {key: content[key] for key in ("files", "license", "attribution") if key in content}
-    exclusions = {"not": content["not"]} if "not" in content else {}
-    complete = []
-    for item in layers:
-        if isinstance(item, dict):
-            if "reader" in item:
-                raise CatalogError(
-                    f"{where}, layer {item.get('name')!r} has a reader; the catalogue has one for "
-                    "all of its layers."
-                )
-            is_objects = item.get("role", "objects") == "objects"
-            complete.append({**shared, **(exclusions if is_objects else {}), **item})
-        else:
-            complete.append(item)
-    return {**content, "layers": complete}
+    exclusions = {key: content[key] for key in ("not",) if key in content}
+    return content | {
+        "layers": [
+            {**shared, **(exclusions if item.get("role", "objects") == "objects" else {}), **item}
+            if isinstance(item, dict)
+            else item
+            for item in layers
+        ]
+    }
 
 
 # The same text is parsed only once.

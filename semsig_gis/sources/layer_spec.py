@@ -89,6 +89,7 @@ _Tags = Annotated[
     Parsed(_tags, Annotated[dict[str, _Tag], length(1)]),
 ]
 _Count = Annotated[int, number("a number of rows", 0, whole=True)]
+_OfCatalog = Annotated[str, Accepts("it at the top, for all layers", {"type": "none"})]
 _Width = Annotated[float, metres(MAX_WIDTH_M)]
 
 
@@ -220,7 +221,7 @@ class LayerSpec:
     elements: tuple[ElementKind, ...] = ("node", "way", "relation")
     role: Role = "objects"
     optional: Flag = False
-    reader: str = "vector_file"
+    reader: _OfCatalog = "vector_file"
     note: str = ""
     license: str = "unknown"
     attribution: str = ""
