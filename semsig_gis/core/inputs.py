@@ -168,7 +168,7 @@ def check_fields(item: Any, where: str, *, error: type[SemsigError] = InputError
     try:
         table = model.model_validate(values, by_alias=False, by_name=True)
     except ValidationError as fault:
-        raise error(_sentence(fault, model, values, where)) from None
+        raise error(_sentence(fault, model, values, where, verb="give")) from None
     for name in values:
         object.__setattr__(item, name, getattr(table, name))
 
@@ -187,14 +187,21 @@ def _model(kind: Any) -> type[BaseModel]:  # noqa: ANN401
     return create_model(kind.__name__, __base__=FileTable, **fields)
 
 
-def _sentence(error: ValidationError, model: type[BaseModel], values: object, where: str) -> str:
+def _sentence(
+    error: ValidationError,
+    model: type[BaseModel],
+    values: object,
+    where: str,
+    *,
+    verb: str = "write",
+) -> str:
     """Return the first fault as a sentence, or an unknown key, as it may explain a missing one."""
     faults = error.errors(include_url=False)
     fault = next((item for item in faults if item["type"] in UNKNOWN_KEYS), faults[0])
     path = [step for step in fault["loc"] if step != "[key]"]
     if fault["type"] == "value_error":
         return f"{_place(where, values, path)}: {fault['ctx']['error']}"
-    value, remedy = f"{fault['input']!r:.{MOST_CHARACTERS}}", _remedy(fault)
+    value, remedy = f"{fault['input']!r:.{MOST_CHARACTERS}}", _remedy(fault, verb)
     if not path or isinstance(path[-1], int):
         return f"{_place(where, values, path)} is {value}{remedy}."
     place, key = _place(where, values, path[:-1]), str(path[-1])
@@ -209,14 +216,14 @@ def _sentence(error: ValidationError, model: type[BaseModel], values: object, wh
     return f"{place} has {key} = {value}{remedy}."
 
 
-def _remedy(fault: ErrorDetails) -> str:
+def _remedy(fault: ErrorDetails, verb: str) -> str:
     """Return the end of a sentence, with what is accepted."""
     if fault["type"] == "literal_error":
         words = fault["ctx"]["expected"]
         near = nearest_name(str(fault["input"]), re.findall("'(.*?)'", words))
-        return f"{near}; write {words}"
+        return f"{near}; {verb} {words}"
     words = ACCEPTED.get(fault["type"], fault["msg"])
-    return f"; write {words.replace('Input should be', 'a value that is')}"
+    return f"; {verb} {words.replace('Input should be', 'a value that is')}"
 
 
 def _place(where: str, values: Any, path: Sequence[int | str]) -> str:  # noqa: ANN401

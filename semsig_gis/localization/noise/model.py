@@ -166,7 +166,7 @@ class NoiseSpec(Displayed):
     >>> NoiseSpec(detection=1.2)
     Traceback (most recent call last):
     ...
-    semsig_gis.core.errors.InputError: the noise has detection = 1.2; write a chance from 0 to 1.
+    semsig_gis.core.errors.InputError: the noise has detection = 1.2; give a chance from 0 to 1.
     """
 
     detection: _Chance = 0.9
