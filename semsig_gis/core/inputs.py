@@ -45,7 +45,8 @@ ACCEPTED = {
     "mapping_type": "a table",
     "model_type": "a table",
     "dataclass_type": "a table",
-    "too_short": "at least one",
+    "too_short": "at least {min_length}",
+    "too_long": "at most {max_length}",
 }
 UNKNOWN_KEYS = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
 MOST_CHARACTERS = 60  # of a value in a message
@@ -132,9 +133,9 @@ def pairs(kind: object) -> Parsed:
     return Parsed(lambda table: tuple(table.items()), dict.__class_getitem__((str, kind)))
 
 
-def length(least: int) -> Any:  # noqa: ANN401 - pydantic's own type
-    """Return the annotation of a text, list or table with a number of parts, or more."""
-    return Field(min_length=least)
+def length(least: int, most: int | None = None) -> Any:  # noqa: ANN401 - pydantic's own type
+    """Return the annotation of a text, list or table with a number of parts."""
+    return Field(min_length=least, max_length=most)
 
 
 Text = Annotated[str, length(1)]
@@ -152,7 +153,7 @@ def read_table(
     try:
         table = model.model_validate(values)
     except ValidationError as fault:
-        raise error(_sentence(fault, model, values, where)) from None
+        raise _error(error, fault, model, values, where) from None
     if isinstance(table, kind):
         return table
     return kind(**{name: getattr(table, name) for name in table.model_fields_set})
@@ -168,7 +169,7 @@ def check_fields(item: Any, where: str, *, error: type[SemsigError] = InputError
     try:
         table = model.model_validate(values, by_alias=False, by_name=True)
     except ValidationError as fault:
-        raise error(_sentence(fault, model, values, where, verb="give")) from None
+        raise _error(error, fault, model, values, where) from None
     for name in values:
         object.__setattr__(item, name, getattr(table, name))
 
@@ -187,33 +188,33 @@ def _model(kind: Any) -> type[BaseModel]:  # noqa: ANN401
     return create_model(kind.__name__, __base__=FileTable, **fields)
 
 
-def _sentence(
-    error: ValidationError,
+def _error(
+    kind: type[SemsigError],
+    fault: ValidationError,
     model: type[BaseModel],
     values: object,
     where: str,
-    *,
-    verb: str = "write",
-) -> str:
-    """Return the first fault as a sentence, or an unknown key, as it may explain a missing one."""
-    faults = error.errors(include_url=False)
-    fault = next((item for item in faults if item["type"] in UNKNOWN_KEYS), faults[0])
-    path = [step for step in fault["loc"] if step != "[key]"]
-    if fault["type"] == "value_error":
-        return f"{_place(where, values, path)}: {fault['ctx']['error']}"
-    value, remedy = f"{fault['input']!r:.{MOST_CHARACTERS}}", _remedy(fault, verb)
+) -> SemsigError:
+    """Return the first fault as an error, or an unknown key, as it may explain a missing one."""
+    details = fault.errors(include_url=False)
+    first = next((item for item in details if item["type"] in UNKNOWN_KEYS), details[0])
+    path = [step for step in first["loc"] if step != "[key]"]
+    if first["type"] == "value_error":
+        return kind(f"{_place(where, values, path)}: {first['ctx']['error']}")
+    verb = "write" if kind is CatalogError else "give"
+    value = f"{first['input']!r:.{MOST_CHARACTERS}}"
     if not path or isinstance(path[-1], int):
-        return f"{_place(where, values, path)} is {value}{remedy}."
+        return kind(f"{_place(where, values, path)} is {value}{_remedy(first, verb)}.")
     place, key = _place(where, values, path[:-1]), str(path[-1])
-    if fault["type"] == "missing":
-        return f"{place} lacks the key {key!r}; add it."
-    if fault["type"] in UNKNOWN_KEYS:
+    if first["type"] == "missing":
+        return kind(f"{place} lacks the key {key!r}; add it.")
+    if first["type"] in UNKNOWN_KEYS:
         keys = list(_keys(model.model_json_schema(), path[:-1]))
-        return (
+        return kind(
             f"{place} has the key {key!r}, which is unknown{nearest_name(key, keys)}; "
             f"the keys are {', '.join(keys)}."
         )
-    return f"{place} has {key} = {value}{remedy}."
+    return kind(f"{place} has {key} = {value}{_remedy(first, verb)}.")
 
 
 def _remedy(fault: ErrorDetails, verb: str) -> str:
@@ -222,7 +223,7 @@ def _remedy(fault: ErrorDetails, verb: str) -> str:
         words = fault["ctx"]["expected"]
         near = nearest_name(str(fault["input"]), re.findall("'(.*?)'", words))
         return f"{near}; {verb} {words}"
-    words = ACCEPTED.get(fault["type"], fault["msg"])
+    words = ACCEPTED.get(fault["type"], fault["msg"]).format(**fault.get("ctx", {}))
     return f"; {verb} {words.replace('Input should be', 'a value that is')}"
 
 
@@ -237,7 +238,7 @@ def _place(where: str, values: Any, path: Sequence[int | str]) -> str:  # noqa: 
         if isinstance(step, int):
             name = values.get("name") if isinstance(values, Mapping) else None
             label = repr(name) if isinstance(name, str) else f"{step + 1}"
-            words[-1] = f"{re.sub('(?<=ss)es$|s$', '', words[-1])} {label}"
+            words[-1] = f"{re.sub('(?<=ss)es$|(?<!s)s$', '', words[-1])} {label}"
         else:
             words.append(str(step))
     return ", ".join(words)

@@ -6,12 +6,27 @@ import json
 import math
 import shlex
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from semsig_gis.core import FULL_TURN, InputError, UnknownNameError, nearest_name, wrap_degrees
-from semsig_gis.evaluation import SeenFrom
+from semsig_gis.core import (
+    FULL_TURN,
+    MOST_METRES,
+    MOST_SEED,
+    Accepts,
+    FileTable,
+    Flag,  # noqa: TC001 - of fields
+    InputError,
+    UnknownNameError,
+    file_key,
+    length,
+    nearest_name,
+    number,
+    read_table,
+    wrap_degrees,
+)
+from semsig_gis.evaluation import SeenFrom  # noqa: TC001 - of fields
 from semsig_gis.observation import (
     DEGREE_DIGITS,
     ERROR_DIGITS,
@@ -20,7 +35,6 @@ from semsig_gis.observation import (
     Leg,
     View,
     locate_boxes,
-    mappings,
     parse_view,
 )
 
@@ -38,7 +52,121 @@ STEP_ERROR = 0.2
 """Relative standard deviation of the length of a step without a stated error."""
 MOST_TOP, MOST_PHOTOS, MOST_MARKS = 100, 20, 200
 DEFAULT_TOP = 10  # of `semsig localize`
-POINT_LENGTH, BOX_LENGTH = 2, 4
+BOX_LENGTH = 4
+MOST_PIXELS = 1_000_000
+
+_Lat = Annotated[float, number("a latitude", -90, 90)]
+_Lon = Annotated[float, number("a longitude", -360, 360)]
+_Degrees = Annotated[float, number("degrees from -360 to 360", -FULL_TURN, FULL_TURN)]
+_Metres = Annotated[float, number("metres", -MOST_METRES, MOST_METRES)]
+_Pixel = Annotated[float, number("a number of pixels", -MOST_PIXELS, MOST_PIXELS)]
+_Side = Annotated[
+    int, number(f"a whole number from 1 to {MOST_PIXELS:,}", 1, MOST_PIXELS, whole=True)
+]
+_Fov = Annotated[float, number("a field of view in degrees", -FULL_TURN, FULL_TURN)]
+_Box = Annotated[
+    tuple[_Pixel, _Pixel, _Pixel, _Pixel],
+    Accepts("left, top, right and bottom of a box in pixels"),
+]
+LatLon = Annotated[tuple[_Lat, _Lon], Accepts("latitude and longitude in degrees")]
+
+
+class _Seen(FileTable, extra="ignore"):
+    """The class and the range of a marked object, which `parse_view` checks."""
+
+    kind: Annotated[Any, file_key("class")] = "?"
+    range: Any = None
+    range_error: Any = None
+
+
+class _CompassMark(_Seen):
+    bearing: _Degrees
+
+
+class _PhotoMark(_Seen):
+    x: _Pixel | None = None
+    y: _Pixel | None = None
+    box: _Box | None = None
+
+
+class PagePhoto(FileTable, extra="ignore"):
+    """A photo of the page; only one with marks needs a field of view."""
+
+    name: str = ""
+    width: _Side
+    height: _Side
+    fov: _Fov | None = None
+    projection: Any = None
+    heading: _Degrees | None = None
+    heading_error: Any = None
+    marks: Annotated[tuple[_PhotoMark, ...], length(0, MOST_MARKS)] = ()
+
+    @property
+    def camera(self) -> Camera:
+        """The camera; InputError if the field of view is missing or does not fit."""
+        if self.fov is None:
+            raise InputError("the field of view of a photo is missing; give it in degrees.")
+        return Camera(
+            width=self.width,
+            height=self.height,
+            fov=self.fov,
+            projection=self.projection or "pinhole",
+        )
+
+
+class _Step(FileTable, extra="ignore"):
+    bearing: _Degrees
+    metres: _Metres
+    sigma: _Metres | None = None
+
+
+class _PageView(FileTable, extra="ignore"):
+    photos: Annotated[tuple[PagePhoto, ...], length(0, MOST_PHOTOS)] = ()
+    compass: Annotated[tuple[_CompassMark, ...], length(0, MOST_MARKS)] | None = None
+    sectors: Any = None
+    heading_error: Any = None
+    step: _Step | None = None
+
+
+class PagePlace(FileTable, extra="ignore"):
+    """A request about a place."""
+
+    place: LatLon
+
+
+class PageSimulation(PagePlace):
+    """A request for a simulated view, of the full turn or of a photo."""
+
+    fov: _Fov | None = None
+    heading: _Degrees | None = None
+    noise: Any = None
+    seed: Annotated[int, number("a whole number from 0 to 10**18", 0, MOST_SEED, whole=True)] = 0
+
+
+class PageBoxes(FileTable, extra="ignore"):
+    """The content of a file of detections, and the photos to which they may belong."""
+
+    text: str | None = None
+    name: str | None = None
+    classes: str | None = None
+    labels: tuple[str, ...] | None = None
+    photos: tuple[PagePhoto, ...] = ()
+
+
+class _PageQuestion(FileTable, extra="ignore"):
+    views: Annotated[tuple[_PageView, ...], length(0, MOST_PHOTOS)]
+    view: Annotated[int, number("the number of a view", 0, whole=True)] | None = None
+    top: Annotated[int, number(f"a whole number from 1 to {MOST_TOP}", 1, MOST_TOP, whole=True)] = (
+        DEFAULT_TOP
+    )
+    seen_from: SeenFrom = "anywhere"
+    noise: Any = None
+    truth: LatLon | None = None
+    absent: Annotated[tuple[str, ...], Accepts("a list of names of classes")] | None = None
+    near: (
+        Annotated[tuple[_Lat, _Lon, _Metres], Accepts("latitude, longitude and metres")] | None
+    ) = None
+    quick: Flag = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,17 +194,15 @@ class Question:
     @classmethod
     def parse(cls, value: object, *, taxonomy: Taxonomy, radius: float) -> Question:
         """Parse the JSON of a page; InputError or UnknownNameError if it is not a question."""
-        body = _mapping(value, "the question")
-        rows = mappings(body.get("views"), "views", most=MOST_PHOTOS)
+        page = read_table(_PageQuestion, value, "the question", error=InputError)
         places: list[list[tuple[View, list[MarkNumber]]]] = []
         steps: list[Leg] = []
         place_of_view: list[int] = []
-        for index, row in enumerate(rows):
+        for index, row in enumerate(page.views):
             # A view with a step is from a new place, others join the place before.
-            step = row.get("step")
-            if index and step is not None:
-                steps.append(_leg(_mapping(step, "a step")))
-            if not index or step is not None:
+            if index and row.step is not None:
+                steps.append(_leg(row.step))
+            if not index or row.step is not None:
                 places.append([])
             places[-1] += _photos(row, index, taxonomy, radius)
             place_of_view.append(len(places) - 1)
@@ -84,24 +210,22 @@ class Question:
             raise InputError("nothing is marked yet; mark an object that you see.")
         views, marks = zip(*(_merged_view(photos) for photos in places if photos), strict=True)
         legs, place_numbers = _legs(places, steps)
-        last = len(rows) - 1
-        view = _whole(body.get("view", last), "view", most=last)
-        seen_from = body.get("seen_from", "anywhere")
-        if seen_from not in get_args(SeenFrom):
-            raise UnknownNameError(f"seen_from was given as {seen_from!r}; give cells or anywhere.")
-        truth = body.get("truth")
+        last = len(page.views) - 1
+        view = last if page.view is None else page.view
+        if view > last:
+            raise InputError(f"view {view} is not there; give a number from 0 to {last}.")
         return cls(
             views=views,
             marks=marks,
             legs=legs,
             place_number=place_numbers[place_of_view[view]],
-            top=_whole(body.get("top", DEFAULT_TOP), "top", least=1, most=MOST_TOP),
-            seen_from=seen_from,
-            noise=body.get("noise"),
-            truth=None if truth is None else latlon(truth),
-            absent=_absent_codes(body.get("absent") or [], taxonomy),
-            near=_near_text(body.get("near")),
-            quick=body.get("quick") is True,
+            top=page.top,
+            seen_from=page.seen_from,
+            noise=page.noise,
+            truth=page.truth,
+            absent=_absent_codes(page.absent or (), taxonomy),
+            near=None if page.near is None else _near_text(*page.near),
+            quick=page.quick,
         )
 
     def rows(self, taxonomy: Taxonomy) -> list[dict[str, Any]]:
@@ -128,110 +252,66 @@ class Question:
         return f"{lines} | {shlex.join(words)}" + (f"  # without: {absent}" if absent else "")
 
 
-def latlon(value: object) -> tuple[float, float]:
-    """Return a checked latitude and longitude."""
-    if not (isinstance(value, list) and len(value) == POINT_LENGTH):
-        raise InputError(f"a place was given as {value!r}; give latitude and longitude.")
-    return number(value[0], "a latitude", most=90.0), number(value[1], "a longitude", most=360.0)
-
-
-def _near_text(value: object) -> str | None:
-    """Convert [latitude, longitude, metres] to text for ``--near``, such as ``48.9N,2.3E,50``."""
-    if value is None:
-        return None
-    if not (isinstance(value, list) and len(value) == POINT_LENGTH + 1):
-        raise InputError(f"near was given as {value!r}; give latitude, longitude and metres.")
-    lat, lon = latlon(value[:POINT_LENGTH])
-    metres = number(value[POINT_LENGTH], "the deviation of a place")
+def _near_text(lat: float, lon: float, metres: float) -> str:
+    """Return a known place as text for ``--near``, such as ``48.9N,2.3E,50``."""
     return (
         f"{abs(lat):.10g}{'S' if lat < 0 else 'N'},{abs(lon):.10g}{'W' if lon < 0 else 'E'},"
         f"{metres:g}"
     )
 
 
-def number(value: object, what: str, *, most: float = math.inf) -> float:
-    """Return a finite number from -most to most; InputError for any other value."""
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float)
-        or not math.isfinite(value)
-        or abs(value) > most
-    ):
-        limit = "" if math.isinf(most) else f" from {-most:g} to {most:g}"
-        raise InputError(f"{what} was given as {value!r}; give a number{limit}.")
-    return float(value)
-
-
-def camera_of(photo: Mapping[str, Any]) -> Camera:
-    """Return the camera of a photo of the page."""
-    width, height = (
-        _whole(photo.get(side), f"the {side} of a photo", least=1, most=1_000_000)
-        for side in ("width", "height")
-    )
-    return Camera(
-        width=width,
-        height=height,
-        fov=number(photo.get("fov"), "the field of view of a photo"),
-        projection=photo.get("projection") or "pinhole",
-    )
-
-
 def _photos(
-    row: Mapping[str, Any], view: int, taxonomy: Taxonomy, radius: float
+    row: _PageView, view: int, taxonomy: Taxonomy, radius: float
 ) -> list[tuple[View, list[MarkNumber]]]:
     """Return each photo of a view that has marks, and the numbers of the marks by object."""
-    items = [row] if "compass" in row else mappings(row.get("photos"), "photos", most=MOST_PHOTOS)
     photos = []
+    items: tuple[_PageView | PagePhoto, ...] = row.photos if row.compass is None else (row,)
     for index, photo in enumerate(items):
-        name = "compass" if "compass" in photo else "marks"
-        marks = mappings(photo.get(name), name, most=MOST_MARKS)
-        if not marks:
-            continue
-        if name == "compass":
-            detections = [{**mark, "range": mark.get("range")} for mark in marks]
-            look = {"sectors": photo.get("sectors") or []}
-            bearings = [number(mark.get("bearing"), "a bearing", most=360.0) for mark in marks]
-        else:
+        detections: list[dict[str, Any]]
+        if isinstance(photo, _PageView):
+            error = photo.heading_error
+            detections = [mark.model_dump(by_alias=True) for mark in photo.compass or ()]
+            look = {"sectors": photo.sectors or []}
+        elif photo.marks:
             # Bearings of marks are relative to the middle of the photo, which looks at the heading.
-            heading = photo.get("heading")
-            middle = 0.0 if heading is None else number(heading, "a heading", most=360.0)
-            camera = camera_of(photo)
-            detections = _detections(camera, marks, taxonomy)
+            middle = photo.heading or 0.0
+            error = "unknown" if photo.heading is None else photo.heading_error
+            camera = photo.camera
+            detections = _detections(camera, photo.marks, taxonomy)
             for detection in detections:
                 turned = float(wrap_degrees(middle + detection.pop("offset")))
                 detection["bearing"] = round(turned, DEGREE_DIGITS) % FULL_TURN
             edges = [(low + middle, high + middle) for low, high in camera.sectors()]
             full_turn = sum(high - low for low, high in edges) >= FULL_TURN
             look = {"sectors": [] if full_turn else [[low, high] for low, high in edges]}
-            bearings = [detection["bearing"] for detection in detections]
-        error = photo.get("heading_error")
-        if name == "marks" and photo.get("heading") is None:
-            error = "unknown"
+        else:
+            continue
+        if not detections:
+            continue
         if error is not None:
             look["heading_error"] = error
         view_of_photo = parse_view(
             {"detections": detections, **look}, taxonomy=taxonomy, radius=radius
         )
         # The order in which the view sorts its objects.
-        order = np.argsort(wrap_degrees(np.array(bearings)), kind="stable").tolist()
+        bearings = np.array([detection["bearing"] for detection in detections], np.float64)
+        order = np.argsort(wrap_degrees(bearings), kind="stable").tolist()
         photos.append((view_of_photo, [(view, index, mark) for mark in order]))
     return photos
 
 
 def _detections(
-    camera: Camera, marks: Sequence[Mapping[str, Any]], taxonomy: Taxonomy
+    camera: Camera, marks: Sequence[_PhotoMark], taxonomy: Taxonomy
 ) -> list[dict[str, Any]]:
     """Return the class, the offset from the middle in degrees and the range of marks in a photo."""
     corners, heights = [], []
     for mark in marks:
-        box = mark.get("box")
+        box = mark.box
         if box is None:
-            box = [mark.get("x"), mark.get("y")] * 2
-        if not (isinstance(box, list) and len(box) == BOX_LENGTH):
-            raise InputError(
-                f"a box was given as {box!r}; give left, top, right and bottom in pixels."
-            )
-        corners.append([number(side, "a mark", most=1e6) for side in box])
+            if mark.x is None or mark.y is None:
+                raise InputError("a mark has no place in its photo; give x and y, or a box.")
+            box = (mark.x, mark.y, mark.x, mark.y)
+        corners.append(box)
         heights.append(_height(mark, taxonomy))
     # A box may be drawn from any corner, and beyond the edge of the photo.
     edges = np.array(corners).reshape(-1, BOX_LENGTH)
@@ -246,24 +326,22 @@ def _detections(
     detections = []
     columns = marks, offsets.tolist(), ranges.tolist(), errors.tolist()
     for mark, offset, metres, error in zip(*columns, strict=True):
-        detection: dict[str, Any] = {"class": mark.get("class", "?"), "offset": offset}
+        detection: dict[str, Any] = {"class": mark.kind, "offset": offset, "range": None}
         # The range of a mark overrides the one computed from its box.
-        if mark.get("range") is not None:
-            detection |= {"range": mark["range"], "range_error": mark.get("range_error")}
-        elif math.isnan(metres):
-            detection["range"] = None
-        else:
+        if mark.range is not None:
+            detection |= {"range": mark.range, "range_error": mark.range_error}
+        elif not math.isnan(metres):
             detection["range"] = round(metres, METRE_DIGITS)
             detection["range_error"] = round(error, ERROR_DIGITS)
         detections.append(detection)
     return detections
 
 
-def _height(mark: Mapping[str, Any], taxonomy: Taxonomy) -> tuple[float, float]:
+def _height(mark: _PhotoMark, taxonomy: Taxonomy) -> tuple[float, float]:
     """Return height and deviation of the class of a box, NaN if its range needs none."""
-    if mark.get("box") is None or mark.get("range") is not None:
+    if mark.box is None or mark.range is not None:
         return math.nan, math.nan
-    item = next((item for item in taxonomy.classes if item.name == mark.get("class")), None)
+    item = next((item for item in taxonomy.classes if item.name == mark.kind), None)
     if item is None or item.height_m is None or item.height_sigma is None:
         return math.nan, math.nan
     return item.height_m, item.height_sigma
@@ -300,14 +378,9 @@ def _merged_view(
     return view.turned(0.0), tuple(marks[row] for row in order.tolist())
 
 
-def _leg(step: Mapping[str, Any]) -> Leg:
-    metres = number(step.get("metres"), "the length of a step")
-    error = step.get("sigma")
-    return Leg.towards(
-        number(step.get("bearing"), "the bearing of a step", most=360.0),
-        metres,
-        sigma=STEP_ERROR * abs(metres) if error is None else number(error, "the error of a step"),
-    )
+def _leg(step: _Step) -> Leg:
+    sigma = STEP_ERROR * abs(step.metres) if step.sigma is None else step.sigma
+    return Leg.towards(step.bearing, step.metres, sigma=sigma)
 
 
 def _command_options(row: Mapping[str, Any]) -> list[str] | None:
@@ -326,32 +399,12 @@ def _command_options(row: Mapping[str, Any]) -> list[str] | None:
     return words
 
 
-def _absent_codes(names: object, taxonomy: Taxonomy) -> tuple[int, ...]:
-    """Return the class codes of a list of class names."""
+def _absent_codes(names: Sequence[str], taxonomy: Taxonomy) -> tuple[int, ...]:
+    """Return the class codes of names of classes."""
     codes = {item.name: item.code for item in taxonomy.classes}
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise InputError(
-            f"absent was given as {str(names)[:60]!r}; give a list of names of classes."
-        )
     for name in names:
         if name not in codes:
             raise UnknownNameError(
                 f"{name!r} is not a class of this city{nearest_name(name, codes)}."
             )
     return tuple(dict.fromkeys(codes[name] for name in names))
-
-
-def _mapping(value: object, what: str) -> Mapping[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(
-            f"{what} was given as {str(value)[:60]!r}; give a mapping of names to values."
-        )
-    return value
-
-
-def _whole(value: object, what: str, *, least: int = 0, most: int) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        raise InputError(
-            f"{what} was given as {value!r}; give a whole number from {least} to {most:,}."
-        )
-    return value

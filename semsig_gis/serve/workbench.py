@@ -23,6 +23,7 @@ from semsig_gis.core import (
     UnknownNameError,
     class_signs,
     nearest_name,
+    read_table,
     wrap_degrees,
 )
 from semsig_gis.database import visible_objects_at
@@ -64,7 +65,12 @@ from semsig_gis.output import (
     to_metres,
 )
 from semsig_gis.serve.drawing import answer_drawing, class_shares
-from semsig_gis.serve.question import Question, camera_of, latlon, number
+from semsig_gis.serve.question import (
+    PageBoxes,
+    PagePlace,
+    PageSimulation,
+    Question,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -81,6 +87,7 @@ if TYPE_CHECKING:
         Noise,
         QuestionRecord,
     )
+    from semsig_gis.serve.question import PagePhoto
 
 MOST_UPLOAD = 25 * 2**20
 """Most bytes of a request: a picture or a question."""
@@ -236,25 +243,26 @@ class Workbench:
             "notes": notes,
         }
 
-    def boxes(self, body: Mapping[str, Any]) -> dict[str, Any]:
+    def boxes(self, body: object) -> dict[str, Any]:
         """Return the boxes of a detector's file as marks of the photos of the page."""
-        name = PurePosixPath(str(body.get("name") or "boxes.json")).name or "boxes.json"
-        photos = {str(photo.get("name")): photo for photo in body.get("photos") or []}
+        request = read_table(PageBoxes, body, "the request", error=InputError)
+        name = PurePosixPath(request.name or "boxes.json").name or "boxes.json"
+        photos = {photo.name: photo for photo in request.photos}
         shots = {key: _shot(photo) for key, photo in photos.items()}
         stems = {PurePosixPath(key).stem: key for key in photos}
         # The readers of detections expect files, with the labels of YOLO next to the boxes.
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, name)
-            file.write_text(str(body.get("text") or ""), encoding="utf-8")
-            if names := body.get("classes"):
-                Path(folder, "classes.txt").write_text(str(names), encoding="utf-8")
+            file.write_text(request.text or "", encoding="utf-8")
+            if request.classes:
+                Path(folder, "classes.txt").write_text(request.classes, encoding="utf-8")
             try:
                 pictures, _ = read_pictures([file])
             except SemsigError as error:
                 raise InputError(str(error).replace(f"{folder}/", "")) from error
         tally = Tally()
         builder = ViewBuilder(
-            labels=LabelMap.open(body.get("labels") or (), self.taxonomy),
+            labels=LabelMap.open(request.labels or (), self.taxonomy),
             taxonomy=self.taxonomy,
             shots=shots | {stem: shots[key] for stem, key in stems.items()},
         )
@@ -422,10 +430,11 @@ class Workbench:
         suggestions = next_questions(self._index(question), location, absent=question.absent)
         return [suggestion.to_dict() for suggestion in suggestions]
 
-    def cell(self, body: Mapping[str, Any]) -> dict[str, Any]:
+    def cell(self, body: object) -> dict[str, Any]:
         """Return the view from the middle of the cell at a place, and the number of like cells."""
         database = self.database
-        _, _, cell = self._place(body)
+        request = read_table(PagePlace, body, "the request", error=InputError)
+        _, cell = self._place(request)
         sight, types = Sight.of_cell(database, cell), database.type_sequences
         same_types = int((types.inverse == types.inverse[cell]).sum())
         return {
@@ -437,37 +446,31 @@ class Workbench:
             "alike": same_types - 1,
         }
 
-    def _place(self, body: Mapping[str, Any]) -> tuple[list[float], NDArray[np.float64], int]:
-        """Return the place of a request in degrees and in metres, and its cell."""
-        lat, lon = latlon(body.get("place"))
-        place = to_metres((lat, lon), self.database.crs)
+    def _place(self, request: PagePlace) -> tuple[NDArray[np.float64], int]:
+        """Return the place of a request in metres, and its cell."""
+        place = to_metres(request.place, self.database.crs)
         cell = int(self.database.cells_at(place)[0])
         if cell < 0:
             raise InputError("there is no cell at that place; choose one that is shaded.")
-        return [lat, lon], place, cell
+        return place, cell
 
-    def simulate(self, body: Mapping[str, Any]) -> dict[str, Any]:
+    def simulate(self, body: object) -> dict[str, Any]:
         """Return a simulated view from a place, with the errors of a noise model."""
         database = self.database
-        degrees, place, cell = self._place(body)
+        request = read_table(PageSimulation, body, "the request", error=InputError)
+        place, cell = self._place(request)
         sight = self._sight(place, cell)
         look: dict[str, Any] = {"sectors": None}
-        if (fov := body.get("fov")) is not None:
-            heading = number(body.get("heading") or 0.0, "a heading", most=FULL_TURN)
-            photo = Photo.looking(
-                heading=heading, fov=number(fov, "a field of view", most=FULL_TURN)
-            )
+        if request.fov is not None:
+            photo = Photo.looking(heading=request.heading or 0.0, fov=request.fov)
             sight = replace(sight, photo=photo)
             look = {"sectors": [[low, high % FULL_TURN] for low, high in photo.sectors] or None}
         # The true view, then the errors of a detector with this noise.
-        noise = body.get("noise")
         chain = []
-        if noise is not None:
-            chain.append(SimulatedDetector(noise=self.noises[self._checked_noise(noise)]))
-        seed = body.get("seed", 0)
-        if not isinstance(seed, int) or not 0 <= seed <= 10**18:
-            raise InputError(f"a seed was given as {seed!r}; give a whole number from 0 to 10**18.")
-        distorted = prepare_chain(chain, CitySights.of(database))(sight, seed, 0)
+        if request.noise is not None:
+            noise = self.noises[self._checked_noise(request.noise)]
+            chain.append(SimulatedDetector(noise=noise))
+        distorted = prepare_chain(chain, CitySights.of(database))(sight, request.seed, 0)
         return {
             "view": {
                 "compass": self._compass(distorted),
@@ -477,7 +480,7 @@ class Workbench:
             },
             "cell": int(database.cell_ids[cell]),
             "objects": len(sight),
-            "truth": {"place": degrees},
+            "truth": {"place": list(request.place)},
         }
 
     def _compass(self, sight: Sight) -> list[dict[str, Any]]:
@@ -502,13 +505,12 @@ class Workbench:
         return Sight(codes=views.codes, bearings=views.bearings, distances=views.distances)
 
 
-def _shot(photo: Mapping[str, Any]) -> Shot:
+def _shot(photo: PagePhoto) -> Shot:
     """Return the camera and heading of a photo of the page."""
-    camera = camera_of(photo)
-    heading = photo.get("heading")
+    camera = photo.camera
     return Shot(
         camera=camera.projection,
         fov=camera.fov,
-        heading=None if heading is None else number(heading, "a heading", most=FULL_TURN),
+        heading=photo.heading,
         size=(camera.width, camera.height),
     )

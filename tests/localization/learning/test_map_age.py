@@ -141,29 +141,29 @@ BENCH = {"class_name": "bench", "before": 5}
 @pytest.mark.parametrize(
     ("values", "fault"),
     [
-        ([], "drift.json is []; write a table"),
-        ({"years": 1, "classes": {}}, "has classes = {}; write a list"),
+        ([], "drift.json is []; give a table"),
+        ({"years": 1, "classes": {}}, "has classes = {}; give a list"),
         ({"classes": [BENCH]}, "lacks the key 'years'; add it"),
-        ({"years": "two", "classes": [BENCH]}, "has years = 'two'; write years above 0"),
-        ({"years": 0, "classes": [BENCH]}, "has years = 0; write years above 0 and up to 100"),
+        ({"years": "two", "classes": [BENCH]}, "has years = 'two'; give years above 0"),
+        ({"years": 0, "classes": [BENCH]}, "has years = 0; give years above 0 and up to 100"),
         ({"years": 1e9, "classes": [BENCH]}, "years above 0 and up to 100"),
         ({"years": 1, "classes": [{"class_name": "bench"}]}, "class 1 lacks the key 'before'"),
-        ({"years": 1, "classes": ["bench"]}, "class 1 is 'bench'; write a table"),
+        ({"years": 1, "classes": ["bench"]}, "class 1 is 'bench'; give a table"),
         (
             {"years": 1, "classes": [{**BENCH, "addded": 1}]},
             "the nearest is 'added'; the keys are class_name, before",
         ),
         (
             {"years": 1, "classes": [{**BENCH, "class_name": 3}]},
-            "class 1 has class_name = 3; write a string",
+            "class 1 has class_name = 3; give a string",
         ),
         (
             {"years": 1, "classes": [{**BENCH, "added": 0.5}]},
-            "class 1 has added = 0.5; write a whole number",
+            "class 1 has added = 0.5; give a whole number",
         ),
         (
             {"years": 1, "classes": [{**BENCH, "removed": -1}]},
-            "class 1 has removed = -1; write a whole number",
+            "class 1 has removed = -1; give a whole number",
         ),
         ({"years": 1, "classes": [{**BENCH, "removed": 6}]}, "than the 5 there were before"),
         ({"years": 1, "classes": [{**BENCH, "moved": 1}]}, "lacks moved_m; give metres"),

@@ -39,34 +39,34 @@ if TYPE_CHECKING:
 @pytest.mark.parametrize(
     ("values", "fault"),
     [
-        ({"detection": -0.1}, "the noise has detection = -0.1; write a chance from 0 to 1."),
+        ({"detection": -0.1}, "the noise has detection = -0.1; give a chance from 0 to 1."),
         ({"detection": True}, "the noise has detection = True"),
         ({"misnamed": float("nan")}, "the noise has misnamed = nan"),
-        ({"clutter": -1}, "the noise has clutter = -1; write a number from 0"),
-        ({"bearing_sigma": 0}, "the noise has bearing_sigma = 0; write degrees above 0"),
+        ({"clutter": -1}, "the noise has clutter = -1; give a number from 0"),
+        ({"bearing_sigma": 0}, "the noise has bearing_sigma = 0; give degrees above 0"),
         ({"bearing_sigma": 200}, "up to 180"),
         ({"position_sigma": float("inf")}, "the noise has position_sigma = inf"),
         ({"detection_by_class": {"bench": 2}}, "the noise, detection_by_class has bench = 2"),
-        ({"detection_by_class": 0.5}, "has detection_by_class = 0.5; write a table"),
+        ({"detection_by_class": 0.5}, "has detection_by_class = 0.5; give a table"),
         (
             {"confusion": {"bench": {"bench": 0.9}}},
             "the noise, confusion, bench: the shares sum to 0.9",
         ),
         (
             {"confusion": {"bench": {"bench": -1, "bus_stop": 2}}},
-            "confusion, bench has bench = -1; write a chance",
+            "confusion, bench has bench = -1; give a chance",
         ),
-        ({"confusion": {"bench": 1}}, "confusion has bench = 1; write a table"),
+        ({"confusion": {"bench": 1}}, "confusion has bench = 1; give a table"),
         ({"clutter_shares": {"bench": 0.4}}, "clutter_shares: the shares sum to 0.4"),
         ({"detecton": 0.4}, "the key 'detecton', which is unknown; the nearest is 'detection'"),
-        ({"name": 3}, "the noise has name = 3; write a string"),
+        ({"name": 3}, "the noise has name = 3; give a string"),
         ({"specs": []}, "the noise lacks the key 'weights'"),
         ({"specs": [], "weights": []}, "give at least one model"),
         (
             {"specs": [{}], "weights": [0.5]},
             "weights of the mixture are (0.5,); give chances that sum to 1",
         ),
-        ({"specs": [{}, {}], "weights": [1.0, 0.0]}, "weight 2 is 0.0; write a chance above 0"),
+        ({"specs": [{}, {}], "weights": [1.0, 0.0]}, "weight 2 is 0.0; give a chance above 0"),
         (
             {"specs": [{"specs": [{}], "weights": [1]}], "weights": [1]},
             "spec 1 has the key 'specs', which is unknown",
@@ -107,7 +107,7 @@ def test_a_file_and_a_name_without_a_model_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "noise.json"
     for text, word in (
         ("{", "noise.json cannot be read"),
-        ("[1]", "noise.json is [1]; write a table"),
+        ("[1]", "noise.json is [1]; give a table"),
     ):
         file.write_text(text)
         with refused(InputError, word):
