@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import copy
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hypothesis import strategies as st
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 PLAIN = st.one_of(
     st.sampled_from(["", "bench", "streets", "class", "EPSG:4326", "<0", "<x", "/[/", "*"]),
@@ -16,7 +19,7 @@ PLAIN = st.one_of(
 
 
 @st.composite
-def with_mistakes(draw: st.DrawFn, document: dict[str, Any], *names: str) -> dict[str, Any]:
+def with_mistakes(draw: st.DrawFn, document: Mapping[str, object], *names: str) -> dict[str, Any]:
     """Return a document in which a few keys and items are changed, removed or added.
 
     Keys that are added have one of the names.
@@ -28,9 +31,9 @@ def with_mistakes(draw: st.DrawFn, document: dict[str, Any], *names: str) -> dic
         ),
         max_leaves=6,
     )
-    document = copy.deepcopy(document)
+    changed: dict[str, Any] = copy.deepcopy(dict(document))
     for _ in range(draw(st.integers(1, 3))):
-        parts: list[Any] = [document]
+        parts: list[Any] = [changed]
         for part in parts:  # which grows
             inner = part.values() if isinstance(part, dict) else part
             parts += [item for item in inner if isinstance(item, dict | list) and item]
@@ -43,4 +46,4 @@ def with_mistakes(draw: st.DrawFn, document: dict[str, Any], *names: str) -> dic
             del part[key]
         else:
             part[key] = draw(values)
-    return document
+    return changed
