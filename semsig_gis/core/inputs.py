@@ -58,7 +58,7 @@ class FileTable(BaseModel):
     Its fields may be dataclasses, in which other keys are errors, too.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)

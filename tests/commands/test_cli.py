@@ -297,7 +297,7 @@ def test_version_imports_no_slow_libraries() -> None:
         "from semsig_gis.cli import main\n"
         "try: main()\n"
         "except SystemExit: pass\n"
-        "print(sorted({'geopandas', 'numpy', 'folium', 'pandas'} & set(sys.modules)))"
+        "print(sorted({'geopandas', 'numpy', 'folium', 'pandas', 'pydantic'} & set(sys.modules)))"
     )
     assert printed(sys.executable, "-c", code).splitlines() == [f"semsig {__version__}", "[]"]
 

@@ -61,8 +61,8 @@ BAD_NAMES = ("", "Tree", "tree-1", "1tree", "arbre à fruits", "tree\n", 7)
 @pytest.mark.parametrize(
     ("attribute", "value", "words"),
     [
-        *(("code", bad, ("'tree'", f"code {bad!r}", "1 to 255")) for bad in BAD_CODES),
-        *(("symbol", bad, ("'tree'", f"symbol {bad!r}", "ASCII letter")) for bad in BAD_SYMBOLS),
+        *(("code", bad, ("'tree'", f"code = {bad!r}", "1 to 255")) for bad in BAD_CODES),
+        *(("symbol", bad, ("'tree'", f"symbol = {bad!r}", "ASCII letter")) for bad in BAD_SYMBOLS),
         *(("name", bad, (repr(bad), "lower-case")) for bad in BAD_NAMES),
     ],
 )
@@ -78,7 +78,7 @@ def test_invalid_code_symbol_or_name_is_refused(
     [(2.0, None), (None, 1.0), (0.0, 1.0), (2.0, 0.0), (2.0, 3.0), (999.0, 1.0)],
 )
 def test_height_needs_a_deviation(height: float | None, sigma: float | None) -> None:
-    with refused(CatalogError, "'tree'", f"height of {height} m", f"height_sigma of {sigma} m"):
+    with refused(CatalogError, "'tree'", "height_", "above 0 and up to 500"):
         dataclasses.replace(OTHER, height_m=height, height_sigma=sigma)
     tall = Taxonomy((dataclasses.replace(OTHER, height_m=9.0, height_sigma=4.0),))
     assert Taxonomy.from_list(tall.to_list()) == tall

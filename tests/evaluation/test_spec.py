@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from mutations import with_mistakes
 from noisy_cells import noise_specs
-from sentences import refused
+from sentences import assert_sentence, refused
 
 from semsig_gis.core import SemsigError
 from semsig_gis.evaluation import (
@@ -19,6 +21,7 @@ from semsig_gis.evaluation import (
     parse_experiment,
 )
 from semsig_gis.localization import LikelihoodMethod, Method, NoiseSpec, parse_method, save_noise
+from semsig_gis.storage import toml_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -154,3 +157,20 @@ def test_two_noise_models_with_the_same_name_are_refused(name: str) -> None:
     distortions = {"b": (SimulatedDetector(noise=second),)}
     with refused(SemsigError, name, "a name of its own"):
         ExperimentSpec(database="city.parquet", methods=methods, distortions=distortions)
+
+
+@settings(max_examples=200)
+@given(
+    with_mistakes(
+        {**tomllib.loads(SMALL), "top": [1], "noises": {"mine": {}}}, "seeds", "city", "/"
+    )
+)
+def test_changed_experiments_are_refused_in_a_sentence_or_read(values: dict[str, Any]) -> None:
+    try:
+        text = toml_text(values)
+    except (TypeError, ValueError):  # a date, or a number that JSON does not have
+        return
+    try:
+        parse_experiment(text)
+    except SemsigError as error:
+        assert_sentence(error)

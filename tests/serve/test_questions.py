@@ -11,16 +11,21 @@ from typing import TYPE_CHECKING, Any
 import geopandas as gpd
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from mutations import with_mistakes
 from noisy_cells import parts_of
 from PIL import Image
 from PIL.ExifTags import GPS, Base
 from pyproj import Transformer
+from sentences import assert_sentence
 from workbench import coco, decompression_bomb, picture
 
+from semsig_gis.core import SemsigError
 from semsig_gis.database import visible_objects_at
 from semsig_gis.localization import NOISES
 from semsig_gis.observation import Camera
 from semsig_gis.serve import Question, Workbench, city_streets
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -338,6 +343,25 @@ def test_invalid_question_is_refused(page: Page, change: dict[str, Any], word: s
     outer = {key: value for key, value in change.items() if key not in {"mark", *inner}}
     marked_photo |= inner
     page.refused("/api/answer", {"views": [{"photos": [marked_photo]}], **outer}, word)
+
+
+MARK = {"x": 10, "y": 10, "box": [1, 2, 3, 4], "class": "bench", "range": "near"}
+ROUTE = {
+    "views": [
+        {"photos": [{**SIDE, "fov": FOV, "heading": 0.0, "heading_error": 5, "marks": [MARK]}]},
+        {"compass": [{"class": "bench", "bearing": 5.0}], "step": {"bearing": 9.0, "metres": 1.0}},
+    ],
+    "near": [48.0, 3.0, 9.0],
+}
+
+
+@settings(max_examples=300)
+@given(with_mistakes(ROUTE, "views", "marks", "range", "truth", "sectors", "projection"))
+def test_changed_question_is_refused_in_a_sentence_or_parsed(question: dict[str, Any]) -> None:
+    try:
+        Question.parse(question, taxonomy=paper_taxonomy(), radius=30.0)
+    except SemsigError as error:
+        assert_sentence(error)
 
 
 def test_detector_boxes_become_marks(page: Page) -> None:

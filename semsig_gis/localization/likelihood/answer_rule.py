@@ -30,12 +30,6 @@ STARTS = 4
 STEPS = 100  # thresholds that are tried at most
 
 
-_Share = Annotated[
-    float, number("a share above 0 and below 1", 0, math.nextafter(1, 0), above=True)
-]
-_Count = Annotated[int, number("a number of queries", 0, whole=True)]
-
-
 class RuleRecord(TypedDict):
     """A rule as plain values; the threshold is None if nothing is answered."""
 
@@ -47,6 +41,12 @@ class RuleRecord(TypedDict):
     answered: int
     wrong: int
     coverage: float
+
+
+_Share = Annotated[
+    float, number("a share above 0 and below 1", 0, math.nextafter(1, 0), above=True)
+]
+_Count = Annotated[int, number("a number of queries", 0, whole=True)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

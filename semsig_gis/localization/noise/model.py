@@ -45,6 +45,37 @@ ALL = "all"
 ROUNDING = 1e-6  # of sums of shares, and of squares of metres
 
 
+class SpecRecord(TypedDict):
+    """The fields of `NoiseSpec` as plain values."""
+
+    detection: float
+    detection_by_class: dict[str, float]
+    misnamed: float
+    misnamed_by_class: dict[str, float]
+    confusion: dict[str, dict[str, float]]
+    clutter: float
+    clutter_shares: dict[str, float]
+    bearing_sigma: float
+    bearing_sigma_by_class: dict[str, float]
+    position_sigma: float
+    missed_each: float
+    misnamed_each: float
+    range_sigma: float
+    range_sigma_by_class: dict[str, float]
+    fading: dict[str, list[list[float]]]
+    repeat: float
+    general: bool
+    name: str
+
+
+class MixtureRecord(TypedDict):
+    """The fields of `NoiseMixture` as plain values."""
+
+    name: str
+    weights: list[float]
+    specs: list[SpecRecord]
+
+
 def _check_shares(shares: Mapping[str, float]) -> Mapping[str, float]:
     total = math.fsum(shares.values())
     if shares and abs(total - 1.0) > ROUNDING:
@@ -75,37 +106,6 @@ _Fading = Annotated[
     ),
     Accepts("pairs of metres, ascending, and a share from 0 to 1"),
 ]
-
-
-class SpecRecord(TypedDict):
-    """The fields of `NoiseSpec` as plain values."""
-
-    detection: float
-    detection_by_class: dict[str, float]
-    misnamed: float
-    misnamed_by_class: dict[str, float]
-    confusion: dict[str, dict[str, float]]
-    clutter: float
-    clutter_shares: dict[str, float]
-    bearing_sigma: float
-    bearing_sigma_by_class: dict[str, float]
-    position_sigma: float
-    missed_each: float
-    misnamed_each: float
-    range_sigma: float
-    range_sigma_by_class: dict[str, float]
-    fading: dict[str, list[list[float]]]
-    repeat: float
-    general: bool
-    name: str
-
-
-class MixtureRecord(TypedDict):
-    """The fields of `NoiseMixture` as plain values."""
-
-    name: str
-    weights: list[float]
-    specs: list[SpecRecord]
 
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from mutations import with_mistakes
 from noisy_cells import TAXONOMY, mixtures, noise_specs, random_database
-from sentences import refused
+from sentences import assert_sentence, refused
 
 from semsig_gis.core import InputError, Signature, UnknownNameError
 from semsig_gis.evaluation import distort, named_distortion
@@ -77,6 +78,15 @@ if TYPE_CHECKING:
 def test_invalid_models_are_refused(values: dict[str, object], fault: str) -> None:
     with refused(InputError, fault):
         noise_from_dict(values)
+
+
+@settings(max_examples=200)
+@given(with_mistakes(named_noise("panorama").to_dict(), "specs", "fading", "clutter", "all", "zzz"))
+def test_changed_models_are_refused_in_a_sentence_or_read(values: dict[str, Any]) -> None:
+    try:
+        noise_from_dict(values)
+    except InputError as error:
+        assert_sentence(error)
 
 
 @given(
