@@ -48,6 +48,7 @@ from semsig_gis.output import (
     OUTLINES,
     by_outcome,
     mark_svg,
+    renderer,
 )
 from semsig_gis.output.figures import axes, plots, scenes
 
@@ -225,7 +226,7 @@ def test_colours_of_reports_have_no_other_meaning() -> None:
 
 def test_web_and_qgis_use_the_same_colours() -> None:
     assert len({mark.shape for mark in OUTCOMES.values()}) == len(OUTCOMES)
-    root = ET.fromstring(by_outcome(geometry="point").renderer)  # noqa: S314 - our own
+    root = ET.fromstring(renderer(by_outcome(geometry="point"), "point"))  # noqa: S314 - our own
     for (outcome, mark), category in zip(OUTCOMES.items(), root.iter("category"), strict=True):
         assert (category.get("value"), category.get("label")) == (outcome, outcome)
         symbol = root.find(f".//symbol[@name='{category.get('symbol')}']")
@@ -235,8 +236,9 @@ def test_web_and_qgis_use_the_same_colours() -> None:
         assert options["color"] == f"{red},{green},{blue},255"
         assert options["name"] == CLASS_MARKERS[mark.shape][0]
         assert f'd="{OUTLINES[mark.shape]}" fill="{mark.colour}"' in mark_svg(mark)
-    assert [*AMBIGUITY.values()] == [*zip(group_labels(), GROUP_COLOURS.values(), strict=True)]
-    assert [colour for _, colour in IDENTIFIABILITY.values()] == list(FOUND_RAMP)
+    assert AMBIGUITY.labels == tuple(group_labels())
+    assert AMBIGUITY.colours == tuple(GROUP_COLOURS.values())
+    assert IDENTIFIABILITY.colours == FOUND_RAMP
 
 
 # --- Signs of classes ---------------------------------------------------------------------------

@@ -8,20 +8,41 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import shapely
 
-from semsig_gis.core import (
-    GEOMETRY,
-)
+from semsig_gis.core import GEOMETRY
 from semsig_gis.database import CellTable, database_specs
-from semsig_gis.output.layers.model import Layer
-from semsig_gis.output.styles import (
-    AMBIGUITY,
-    IDENTIFIABILITY,
-    by_amount,
-)
+from semsig_gis.output.layers.columns import form_of
+from semsig_gis.output.layers.model import Display, Layer
+from semsig_gis.output.layers.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
 
 if TYPE_CHECKING:
     from semsig_gis.database import CellGeometry, SignatureDatabase
     from semsig_gis.evaluation import Identifiability
+
+FORM = form_of("""
+["What is seen"]
+types = ["Types", "Symbols of the street objects that are seen, clockwise from north."]
+length = ["Objects seen", "How many street objects are seen from the cell."]
+bearings = ["Bearings", "Of the same objects, clockwise from grid north.", "°"]
+distances = ["Distances", "Of the same objects, from the viewpoint.", "m"]
+levels = ["Angle levels", "The bearings, in whole sectors of the full turn."]
+["Cells like it"]
+type_group_size = ["Cells with the same types", "1: no other cell."]
+angle_group_size = ["Cells with the same bearings", "By angle level; 1: no other cell."]
+chance_found = ["Chance to be found", "That the best place for a query from here is near, from 0 to 1.", "1", 3]
+chance_near = ["Chance given to places near", "Expected, of the answer to a query from here, from 0 to 1.", "1", 3]
+chance_itself = ["Chance given to the cell", "Expected, of the answer to a query from here, from 0 to 1.", "1", 3]
+bits_left = ["Bits left to be known", "Expected entropy of the answer to a query from here.", "", 2]
+["What it is mistaken for"]
+"lookalike_#" = ["Confused with cell: {}", "Number of a cell far away that a query from here is mistaken for."]
+"lookalike_#_chance" = ["Chance of confused cell {}", "Expected chance given to its surroundings.", "", 4]
+["Gain by class"]
+"gain_*" = ["Gain by: {}", "By how much the chance of places near rises because such objects are known.", "", 4]
+[Place]
+cell_id = ["Cell", "Number of the cell in the grid."]
+x = ["Viewpoint, east", "In the coordinate system of the layer.", "m", 2]
+y = ["Viewpoint, north", "In the coordinate system of the layer.", "m", 2]
+""")  # noqa: E501
+DISPLAY = Display(level=0, group="City", name="""'cell ' || "cell_id" || ', ' || "types" """)
 
 
 def cells_layer(
@@ -67,6 +88,8 @@ def cells_layer(
         read=read,
         licenses=database.licenses,
         facts=facts,
+        form=FORM,
+        display=DISPLAY,
         styles=tuple(styles),
         taxonomy=database.taxonomy,
         reach=database.reach,

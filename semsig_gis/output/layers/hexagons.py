@@ -12,8 +12,9 @@ from pyproj import Transformer
 
 from semsig_gis.core import InputError
 from semsig_gis.database import database_specs
-from semsig_gis.output.layers.model import group_means, table_layer
-from semsig_gis.output.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
+from semsig_gis.output.layers.columns import form_of
+from semsig_gis.output.layers.model import Display, group_means, table_layer
+from semsig_gis.output.layers.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,6 +26,21 @@ if TYPE_CHECKING:
 
 
 FINEST = 15
+FORM = form_of("""
+[Hexagon]
+h3 = ["Hexagon", "Its index of H3."]
+cells = ["Cells", "How many cells it has."]
+objects = ["Street objects", "How many street objects it has."]
+mean_length = ["Objects seen", "From its mean cell.", "", 1]
+type_group_size = ["Cells with the same types", "For the median cell; 1: no other cell.", "", 0]
+ambiguous = ["Share that look like another", "Of its cells, by types, from 0 to 1.", "1", 3]
+chance_found = ["Chance to be found", "For a query from its mean cell, from 0 to 1.", "1", 3]
+queries = ["Queries", "How many queries of the evaluation are from it."]
+found = ["Share found", "Of these queries, from 0 to 1.", "1", 3]
+""")
+DISPLAY = Display(
+    level=2, group="City", name="""'hexagon ' || "h3" """, farther=25000, covers="cells"
+)
 
 
 def hexagons_layer(
@@ -85,7 +101,9 @@ def hexagons_layer(
         geometry="polygon",
         licenses=database.licenses,
         facts={**database_specs(database), "h3_resolution": resolution},
-        styles=tuple(by_amount(*style, geometry="polygon", size=0.0) for style in styles),
+        form=FORM,
+        display=DISPLAY,
+        styles=tuple(by_amount(*style, geometry="polygon") for style in styles),
     )
 
 

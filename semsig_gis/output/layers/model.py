@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,9 +13,8 @@ import pyarrow as pa
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core import (
-    GEOMETRY,
-)
+from semsig_gis.core import GEOMETRY
+from semsig_gis.output.layers.columns import described
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.core import Taxonomy
-    from semsig_gis.output.styles import Style
+    from semsig_gis.output.layers.columns import Column, Form
+    from semsig_gis.output.layers.styles import Style
 
     Progress = Callable[[int, int], None] | None  # called with the numbers of rows: done, all
 
@@ -34,8 +35,27 @@ GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Display:
+    """How a layer is shown in QGIS: its place in the legend, its texts and the scales it has."""
+
+    level: int = 0  # of two layers, that with the higher level is drawn on top
+    group: str = "Layers"  # of the legend
+    name: str = ""  # expression for the name of a feature in lists and searches
+    label: str = ""  # expression of the label on the map
+    # The layer is hidden where the denominator of the scale is greater or smaller.
+    nearer: int = 0
+    farther: int = 0
+    covers: str = ""  # a layer that is hidden where this one is visible
+    hidden: bool = False  # when the project opens
+    joins: tuple[str, tuple[str, ...]] | None = None  # a layer, and the columns that join the two
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Layer:
-    """A table, usually with geometry, that is read in blocks of rows to limit the memory."""
+    """A table, usually with geometry, that is read in blocks of rows to limit the memory.
+
+    What renders a layer reads its columns and its styles here, and knows nothing else about it.
+    """
 
     name: str
     title: str
@@ -47,9 +67,22 @@ class Layer:
     read: Callable[[slice], pa.Table]  # the geometry, as WKB, is the last column
     licenses: tuple[str, ...]
     facts: Mapping[str, Any]  # plain values for JSON
+    form: Form = field(default_factory=dict)
     styles: tuple[Style, ...] = ()  # the first is the default
+    display: Display = Display()
     taxonomy: Taxonomy | None = None  # of the symbols in its texts
     reach: float = 1.0  # longest visibility range, metres
+
+    @functools.cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns in the table, without the geometry."""
+        return tuple(name for name in self.read(slice(0, 0)).column_names if name != GEOMETRY)
+
+    @functools.cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Descriptions of the columns, in the order of the form."""
+        classes = () if self.taxonomy is None else self.taxonomy.classes
+        return described(self.names, self.form, {item.name: item.title for item in classes})
 
     @property
     def credits(self) -> dict[str, Any]:

@@ -39,7 +39,6 @@ from semsig_gis.objects import objects_of
 from semsig_gis.output.files.tables import write_errors
 from semsig_gis.output.layers.model import GEOMETRY_TYPES
 from semsig_gis.output.qgis.project import layer_style, project_archive, shown_layers
-from semsig_gis.output.styles import Style
 from semsig_gis.storage import parse_json, whole_file
 
 if TYPE_CHECKING:
@@ -331,17 +330,17 @@ def _write_layer(layer: Layer, path: Path) -> Iterator[int]:
 def _write_styles(layers: Sequence[Layer], path: Path, file: str) -> None:
     """Write the styles and field names of the layers for QGIS, and a project of the file `file`."""
     shown = shown_layers(layers, file)
-    by_name = {layer.key: layer for layer in shown}
+    by_name = {item.layer.name: item for item in shown}
     with contextlib.closing(sqlite3.connect(path)) as connection, connection:
         connection.executescript(STYLES + FIELDS + PROJECTS)
-        for layer in (by_name[layer.name] for layer in layers):
+        for layer in layers:
             # A table without geometry has only the style of its field names.
-            for number, style in enumerate(layer.styles or (Style("Fields", ""),)):
-                qml = layer_style(layer, style)
-                values = (style.name, qml, number == 0, layer.title, layer.key)
-                connection.execute(STYLE, values)
-            for field in layer.fields:
-                row = (layer.key, field.name, field.alias, field.alias, field.about)
+            for number, style in enumerate(layer.styles or (None,)):
+                name = "Fields" if style is None else style.name
+                qml = layer_style(by_name[layer.name], style)
+                connection.execute(STYLE, (name, qml, number == 0, layer.title, layer.name))
+            for column in layer.columns:
+                row = (layer.name, column.name, column.alias, column.alias, column.about)
                 connection.execute(FIELD, row)
         archive = project_archive(layers, shown, Path(file).stem)
         connection.execute(PROJECT, (PROJECT_NAME, archive.hex()))

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from semsig_gis.core import CELL_CHANCES, ERROR_BREAKS, FAILURES, InputError, percent
+from semsig_gis.core import InputError
 from semsig_gis.output.layers.model import group_means
-from semsig_gis.output.styles import AMBIGUITY, IDENTIFIABILITY
+from semsig_gis.output.layers.styles import AMBIGUITY, CHANCES, ERRORS, FAILED, IDENTIFIABILITY
+from semsig_gis.output.qgis.qml import by_pixel
 from semsig_gis.storage import write_whole
 
 if TYPE_CHECKING:
@@ -23,45 +22,17 @@ if TYPE_CHECKING:
     from semsig_gis.core import GridSpec
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import ErrorField, Evaluation
-    from semsig_gis.output.styles import Classes
+    from semsig_gis.output.layers.styles import Scale
 
 
-FAILED: Classes = {
-    (low, high): (f"failed: {percent(low, 0)} to {percent(high, 0)}", colour)
-    for (low, high), colour in zip(pairwise([*FAILURES, 1.0]), FAILURES.values(), strict=True)
-}
-"""Label and colour of a place, by the share of the queries around it that failed."""
-
-# Larger errors are darker, in the colours of the shares that failed.
-_METRES = [*(f"{low} to {high} m" for low, high in pairwise((0, *ERROR_BREAKS))), "farther"]
-ERRORS: Classes = {
-    bounds: (label, colour)
-    for bounds, label, colour in zip(
-        pairwise((0, *ERROR_BREAKS, np.inf)), _METRES, FAILURES.values(), strict=True
-    )
-}
-"""Label and colour of a cell, by the mean error of the queries from it."""
-
-CLEAR = "#ffffff00"
-CHANCES: Classes = {
-    (0.0, min(CELL_CHANCES)): (f"less than {percent(min(CELL_CHANCES), 3)}", CLEAR),
-    **{
-        (low, high): (f"{100 * low:g} % or more", colour)
-        for (low, high), colour in zip(
-            pairwise([*CELL_CHANCES, 1.0]), CELL_CHANCES.values(), strict=True
-        )
-    },
-}
-"""Label and colour of a cell, by the chance that the place is in it."""
-
-STYLES: Mapping[str, Classes] = {
+SCALES: Mapping[str, Scale] = {
     "ambiguity": AMBIGUITY,
     "identifiability": IDENTIFIABILITY,
     "error": ERRORS,
     "field": FAILED,
     "posterior": CHANCES,
 }
-"""Labels and colours of the first band of each raster."""
+"""Classes of the first band of each raster."""
 
 
 def export_geotiff(
@@ -166,24 +137,8 @@ def _write_raster(
     }
     columns, rows = places
     write_cells(path, bands, grid=grid, columns=columns, rows=rows, crs=database.crs, notes=notes)
-    if style in STYLES:
-        write_whole(Path(path).with_suffix(".qml"), by_pixel(STYLES[style]))
-
-
-def by_pixel(classes: Classes) -> str:
-    """Return a QML document that colours the first band of a raster; upper bounds are inclusive."""
-    root = ET.Element("qgis", version="3.22.0", styleCategories="Symbology")
-    band = {"type": "singlebandpseudocolor", "band": "1", "opacity": "1", "alphaBand": "-1"}
-    bounds = [*classes]
-    ends = {"classificationMin": f"{bounds[0][0]:g}", "classificationMax": f"{bounds[-1][0]:g}"}
-    renderer = ET.SubElement(ET.SubElement(root, "pipe"), "rasterrenderer", {**band, **ends})
-    steps = {"colorRampType": "DISCRETE", "classificationMode": "1", "clip": "0"}
-    shader = ET.SubElement(ET.SubElement(renderer, "rastershader"), "colorrampshader", steps)
-    for (low, high), (label, colour) in classes.items():
-        value = "inf" if (low, high) == bounds[-1] else f"{high:g}"
-        item = {"value": value, "label": label, "color": colour[:7]}
-        ET.SubElement(shader, "item", {**item, "alpha": "0" if colour == CLEAR else "255"})
-    return ET.tostring(root, encoding="unicode")
+    if style in SCALES:
+        write_whole(Path(path).with_suffix(".qml"), by_pixel(SCALES[style]))
 
 
 def cell_errors(evaluation: Evaluation, database: SignatureDatabase) -> NDArray[np.float64]:

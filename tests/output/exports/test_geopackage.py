@@ -54,6 +54,7 @@ from semsig_gis.output import (
     export_answer,
     export_database,
     read_geopackage,
+    renderer,
 )
 from semsig_gis.sources import paper_taxonomy
 
@@ -62,7 +63,7 @@ if TYPE_CHECKING:
 
 LOCAL = CRS("+proj=tmerc +lat_0=43.6123456789 +lon_0=3.88 +k=0.99987 +ellps=GRS80 +units=m")
 LICENSE = "Town: é <b>\"quoted\"</b> & 'single' ]]> (CC0): trees, lamps"
-PROGRAM = Path(__file__).parents[1] / "qgis_programs.py"
+PROGRAM = Path(__file__).parents[2] / "qgis_programs.py"
 FEATURES = ["cells", "objects", "evaluation", "evaluation_lines"]
 LAYERS = [*FEATURES, "evaluation_figures", "layer_styles"]
 FORMULA = '=cmd|"/C calc"!A0 <script>'
@@ -365,8 +366,11 @@ def test_file_that_is_opened_during_the_export_is_unchanged(tmp_path: Path) -> N
 
 def test_objects_have_the_signs_of_their_classes() -> None:
     taxonomy = paper_taxonomy()
-    root = ET.fromstring(by_class(taxonomy, [1, 5, 11]).renderer)  # noqa: S314 - our own
-    symbols = {item.attrib["name"]: item for item in root.iter("symbol")}
+    root = ET.fromstring(renderer(by_class(taxonomy, [1, 5, 11]), "point"))  # noqa: S314 - our own
+    by_name = {item.attrib["name"]: item for item in root.iter("symbol")}
+    symbols = {
+        item.attrib["value"]: by_name[item.attrib["symbol"]] for item in root.iter("category")
+    }
     assert sorted(symbols, key=int) == ["1", "5", "11"]
     for code, symbol in symbols.items():
         sign = class_signs(taxonomy)[int(code)]

@@ -31,7 +31,6 @@ from semsig_gis.output import (
     export_answer,
     export_database,
     hexagons_layer,
-    layer_fields,
     objects_layer,
     project_archive,
     shown_layers,
@@ -41,7 +40,7 @@ from semsig_gis.output import (
 if TYPE_CHECKING:
     from semsig_gis.localization import Localization, Location
 
-PROGRAM = Path(__file__).parents[1] / "qgis_programs.py"
+PROGRAM = Path(__file__).parents[2] / "qgis_programs.py"
 SVG = "{http://www.w3.org/2000/svg}"
 CITY, OBJECTS = small_city()
 CHANCES, EVALUATION = chances_of(CITY), small_evaluation()
@@ -161,9 +160,8 @@ def test_every_field_has_an_alias_and_a_description(tmp_path: Path) -> None:
         *(layer for answer in answers for layer in answer),
     ]
     for layer in layers:
-        fields = layer_fields(layer)
-        assert all(field.about and field.alias != field.name for field in fields), layer.name
-        assert len({field.alias for field in fields}) == len(fields)
+        assert all(column.about and column.alias != column.name for column in layer.columns)
+        assert len({column.alias for column in layer.columns}) == len(layer.names)
     name = "a\udcff\x01 b"
     first, second = (project_archive(layers, shown_layers(layers, name), name) for _ in range(2))
     assert first == second
