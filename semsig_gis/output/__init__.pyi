@@ -1,8 +1,6 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
 from .export import ITEM as ITEM
-from .export import LAYERS as LAYERS
-from .export import RASTERS as RASTERS
 from .export import export_answer as export_answer
 from .export import export_database as export_database
 from .export import export_item as export_item
@@ -31,8 +29,13 @@ from .figures.scenes import draw_scene as draw_scene
 from .figures.scenes import draw_scenes as draw_scenes
 from .figures.scenes import example_scenes as example_scenes
 from .figures.scenes import failure_pairs as failure_pairs
-from .files.tables import as_written as as_written
-from .files.tables import formula_safe as formula_safe
+from .files import FORMATS as FORMATS
+from .files import Writer as Writer
+from .files import export_suffixes as export_suffixes
+from .files import writer as writer
+from .files.csv import as_written as as_written
+from .files.csv import formula_safe as formula_safe
+from .files.tif import export_geotiff as export_geotiff
 from .html.answer import RASTER_SUFFIXES as RASTER_SUFFIXES
 from .html.cells import Cells as Cells
 from .html.cells import ambiguity_legend as ambiguity_legend
@@ -84,14 +87,24 @@ from .html.page_elements import panel_signs as panel_signs
 from .html.page_elements import search_area as search_area
 from .html.page_elements import to_latlon as to_latlon
 from .html.page_elements import to_metres as to_metres
+from .layers import LAYERS as LAYERS
+from .layers import layer_names as layer_names
 from .layers.answer import answer_layers as answer_layers
 from .layers.cells import cells_layer as cells_layer
-from .layers.evaluation import evaluation_layers as evaluation_layers
-from .layers.evaluation import split_figures as split_figures
+from .layers.columns import form_of as form_of
+from .layers.evaluation import evaluation_layer as evaluation_layer
+from .layers.evaluation_lines import evaluation_lines_layer as evaluation_lines_layer
 from .layers.hexagons import hexagons_layer as hexagons_layer
+from .layers.model import Display as Display
+from .layers.model import Layer as Layer
+from .layers.model import Raster as Raster
+from .layers.model import cell_raster as cell_raster
+from .layers.model import table_layer as table_layer
 from .layers.objects import objects_layer as objects_layer
 from .layers.styles import AMBIGUITY as AMBIGUITY
+from .layers.styles import CHANCES as CHANCES
 from .layers.styles import ERRORS as ERRORS
+from .layers.styles import FAILED as FAILED
 from .layers.styles import IDENTIFIABILITY as IDENTIFIABILITY
 from .layers.styles import by_class as by_class
 from .layers.styles import by_outcome as by_outcome
@@ -109,9 +122,9 @@ from .qgis.qml import CLASS_MARKERS as CLASS_MARKERS
 from .qgis.qml import CLEAR as CLEAR
 from .qgis.qml import by_pixel as by_pixel
 from .qgis.qml import renderer as renderer
-from .qgis.rasters import SCALES as SCALES
-from .qgis.rasters import cell_errors as cell_errors
-from .qgis.rasters import export_geotiff as export_geotiff
+from .rasters import RASTERS as RASTERS
+from .rasters import raster_names as raster_names
+from .rasters.error import cell_errors as cell_errors
 from .report_model import Curve as Curve
 from .report_model import Number as Number
 from .report_model import OutcomeMap as OutcomeMap

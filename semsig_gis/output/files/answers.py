@@ -12,7 +12,7 @@ import pyogrio
 import shapely
 
 from semsig_gis.core import ANSWERS, GEOMETRY, one_line
-from semsig_gis.output.files.tables import geojson_options, write_errors
+from semsig_gis.output.features import geojson_options, write_errors
 from semsig_gis.output.layers.styles import RANKS
 from semsig_gis.storage import whole_file
 

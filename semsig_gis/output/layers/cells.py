@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import geopandas as gpd
+import numpy as np
 import pyarrow as pa
 import shapely
 
 from semsig_gis.core import GEOMETRY
 from semsig_gis.database import CellTable, database_specs
+from semsig_gis.output.layers import LAYERS
 from semsig_gis.output.layers.columns import form_of
-from semsig_gis.output.layers.model import Display, Layer
+from semsig_gis.output.layers.model import Display, Layer, group_means, table_layer
 from semsig_gis.output.layers.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from semsig_gis.database import CellGeometry, SignatureDatabase
     from semsig_gis.evaluation import Identifiability
 
@@ -45,6 +50,7 @@ y = ["Viewpoint, north", "In the coordinate system of the layer.", "m", 2]
 DISPLAY = Display(level=0, group="City", name="""'cell ' || "cell_id" || ', ' || "types" """)
 
 
+@LAYERS.register
 def cells_layer(
     database: SignatureDatabase,
     *,
@@ -93,4 +99,56 @@ def cells_layer(
         styles=tuple(styles),
         taxonomy=database.taxonomy,
         reach=database.reach,
+        cell_size=step,
+        squares=functools.partial(squares_layer, database, identifiability=identifiability),
     )
+
+
+def squares_layer(
+    database: SignatureDatabase, side: int, *, identifiability: Identifiability | None = None
+) -> Layer:
+    """Return the layer of the squares of `side` by `side` cells that contain a cell."""
+    cells = np.stack([database.columns, database.rows], axis=1)
+    squares, areas = np.unique(cells // side, axis=0, return_inverse=True)
+    low = database.grid.origin + squares * (database.grid.step * side)
+    high = low + database.grid.step * side
+    number, areas = len(squares), areas.ravel()
+    columns = area_statistics(database, areas, number, identifiability=identifiability)
+    return table_layer(
+        gpd.GeoDataFrame(columns, geometry=shapely.box(*low.T, *high.T), crs=database.crs),
+        name="squares",
+        title="Squares of cells",
+        description="The cells in each square, together.",
+        geometry="polygon",
+        licenses=(),
+        facts={},
+    )
+
+
+def area_statistics(
+    database: SignatureDatabase,
+    areas: NDArray[np.int64],
+    count: int,
+    *,
+    identifiability: Identifiability | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Return statistics of the cells in each area; `areas` has the area number of each cell.
+
+    ``cells`` is their number, ``mean_length`` the mean number of objects that they see,
+    ``ambiguous`` the share of cells with the types of another cell, ``type_group_size`` the median,
+    and ``chance_found`` the mean chance to be found. NaN in an area without cells.
+    """
+    cells, sizes = np.bincount(areas, minlength=count), database.type_group_sizes
+    # Lower median: the middle row of each area, with the rows sorted by area and size.
+    ordered = sizes[np.lexsort((sizes, areas))]
+    middles = np.cumsum(cells) - cells + (cells - 1) // 2
+    medians = np.where(cells > 0, ordered[np.minimum(middles, len(ordered) - 1)], np.nan)
+    columns = {
+        "cells": cells,
+        "mean_length": group_means(areas, database.lengths, count),
+        "ambiguous": group_means(areas, sizes > 1, count),
+        "type_group_size": medians,
+    }
+    if identifiability is not None:
+        columns["chance_found"] = group_means(areas, identifiability.found, count)
+    return columns

@@ -1,4 +1,4 @@
-"""Statistics of cells by area, and the layer of H3 hexagons with them."""
+"""The layer of H3 hexagons, with statistics of the cells in each."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from pyproj import Transformer
 
 from semsig_gis.core import InputError
 from semsig_gis.database import database_specs
+from semsig_gis.output.layers import LAYERS
+from semsig_gis.output.layers.cells import area_statistics
 from semsig_gis.output.layers.columns import form_of
 from semsig_gis.output.layers.model import Display, group_means, table_layer
 from semsig_gis.output.layers.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
@@ -43,6 +45,7 @@ DISPLAY = Display(
 )
 
 
+@LAYERS.register
 def hexagons_layer(
     database: SignatureDatabase,
     resolution: int,
@@ -105,32 +108,3 @@ def hexagons_layer(
         display=DISPLAY,
         styles=tuple(by_amount(*style, geometry="polygon") for style in styles),
     )
-
-
-def area_statistics(
-    database: SignatureDatabase,
-    areas: NDArray[np.int64],
-    count: int,
-    *,
-    identifiability: Identifiability | None = None,
-) -> dict[str, NDArray[Any]]:
-    """Return statistics of the cells in each area; `areas` has the area number of each cell.
-
-    ``cells`` is their number, ``mean_length`` the mean number of objects that they see,
-    ``ambiguous`` the share of cells with the types of another cell, ``type_group_size`` the median,
-    and ``chance_found`` the mean chance to be found. NaN in an area without cells.
-    """
-    cells, sizes = np.bincount(areas, minlength=count), database.type_group_sizes
-    # Lower median: the middle row of each area, with the rows sorted by area and size.
-    ordered = sizes[np.lexsort((sizes, areas))]
-    middles = np.cumsum(cells) - cells + (cells - 1) // 2
-    medians = np.where(cells > 0, ordered[np.minimum(middles, len(ordered) - 1)], np.nan)
-    columns = {
-        "cells": cells,
-        "mean_length": group_means(areas, database.lengths, count),
-        "ambiguous": group_means(areas, sizes > 1, count),
-        "type_group_size": medians,
-    }
-    if identifiability is not None:
-        columns["chance_found"] = group_means(areas, identifiability.found, count)
-    return columns

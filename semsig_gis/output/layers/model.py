@@ -1,4 +1,4 @@
-"""Layers: tables with a geometry, columns and styles, read in blocks of rows."""
+"""Layers: tables with a geometry, columns and styles, read in blocks of rows; and rasters."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ import pyarrow as pa
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core import GEOMETRY
+from semsig_gis.core import GEOMETRY, InputError
 from semsig_gis.output.layers.columns import described
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     import geopandas as gpd
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core import Taxonomy
+    from semsig_gis.core import GridSpec, Taxonomy
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.output.layers.columns import Column, Form
-    from semsig_gis.output.layers.styles import Style
+    from semsig_gis.output.layers.styles import Scale, Style
 
     Progress = Callable[[int, int], None] | None  # called with the numbers of rows: done, all
 
@@ -72,6 +73,9 @@ class Layer:
     display: Display = Display()
     taxonomy: Taxonomy | None = None  # of the symbols in its texts
     reach: float = 1.0  # longest visibility range, metres
+    parts: tuple[Layer, ...] = ()  # tables with fewer columns, for a format of several layers
+    cell_size: float = 0.0  # metres
+    squares: Callable[[int], Layer] | None = None  # statistics by the number of cells on a side
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
@@ -141,3 +145,48 @@ def group_means(groups: NDArray[np.int64], values: NDArray[Any], count: int) -> 
     means = np.full(count, np.nan)
     np.divide(np.bincount(groups, values, count), numbers, out=means, where=numbers > 0)
     return means
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Raster:
+    """Numbers at columns and rows of a grid, in bands."""
+
+    name: str
+    grid: GridSpec
+    columns: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    crs: CRS
+    bands: Mapping[str, tuple[NDArray[np.float64], str]]  # numbers and their unit; NaN is no data
+    licenses: tuple[str, ...]
+    version: str  # of the program that wrote the database
+    facts: Mapping[str, Any] = field(default_factory=dict)  # plain values for JSON
+    scale: Scale | None = None  # classes of the first band
+
+
+def cell_raster(
+    database: SignatureDatabase,
+    name: str,
+    values: ArrayLike,
+    *,
+    unit: str = "",
+    scale: Scale | None = None,
+    facts: Mapping[str, Any] | None = None,
+) -> Raster:
+    """Return a raster with one number for each cell; InputError for another number of them."""
+    numbers = np.asarray(values, dtype=np.float64)
+    if numbers.shape != (len(database),):
+        raise InputError(
+            f"{numbers.size} numbers were given for {len(database)} cells; give one for each."
+        )
+    return Raster(
+        name=name,
+        grid=database.grid,
+        columns=database.columns,
+        rows=database.rows,
+        crs=database.crs,
+        bands={name: (numbers, unit)},
+        licenses=database.licenses,
+        version=database.version,
+        facts=facts or {},
+        scale=scale,
+    )

@@ -18,6 +18,7 @@ from semsig_gis.core import (
     SOURCE_ID,
 )
 from semsig_gis.objects import objects_specs
+from semsig_gis.output.layers import LAYERS
 from semsig_gis.output.layers.columns import form_of
 from semsig_gis.output.layers.model import Display, Layer
 from semsig_gis.output.layers.styles import by_class
@@ -45,6 +46,7 @@ DISPLAY = Display(
 )
 
 
+@LAYERS.register
 def objects_layer(objects: StreetObjects) -> Layer:
     """Return the layer of the street objects."""
     classes = {item.code: item for item in objects.taxonomy.classes}

@@ -36,7 +36,7 @@ from semsig_gis.core import (
 from semsig_gis.database import database_of
 from semsig_gis.evaluation import identifiability_of
 from semsig_gis.objects import objects_of
-from semsig_gis.output.files.tables import write_errors
+from semsig_gis.output.features import write_errors
 from semsig_gis.output.layers.model import GEOMETRY_TYPES
 from semsig_gis.output.qgis.project import layer_style, project_archive, shown_layers
 from semsig_gis.storage import parse_json, whole_file

@@ -20,8 +20,10 @@ from semsig_gis.core import ERROR_BREAKS, FAILURES, GridSpec, InputError
 from semsig_gis.evaluation import error_field
 from semsig_gis.output import (
     AMBIGUITY,
+    CHANCES,
     ERRORS,
-    SCALES,
+    FAILED,
+    IDENTIFIABILITY,
     by_pixel,
     cell_errors,
     export_answer,
@@ -32,6 +34,15 @@ from semsig_gis.storage import raster
 
 if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
+
+
+SCALES = {
+    "ambiguity": AMBIGUITY,
+    "identifiability": IDENTIFIABILITY,
+    "error": ERRORS,
+    "field": FAILED,
+    "posterior": CHANCES,
+}
 
 
 def assert_holds(file: Path, database: SignatureDatabase, values: np.ndarray) -> None:

@@ -27,14 +27,14 @@ from semsig_gis.objects import Licence
 from semsig_gis.output import (
     answer_layers,
     cells_layer,
-    evaluation_layers,
+    evaluation_layer,
+    evaluation_lines_layer,
     export_answer,
     export_database,
     hexagons_layer,
     objects_layer,
     project_archive,
     shown_layers,
-    split_figures,
 )
 
 if TYPE_CHECKING:
@@ -149,14 +149,14 @@ def test_qgis_evaluates_no_texts_from_data(projects: dict[str, Any]) -> None:
 
 def test_every_field_has_an_alias_and_a_description(tmp_path: Path) -> None:
     file = tmp_path / "city.gpkg"
-    queries, lines = evaluation_layers(EVALUATION, CITY)
+    queries, lines = (make(EVALUATION, CITY) for make in (evaluation_layer, evaluation_lines_layer))
     answers = (
         answer_layers(answer, CITY, search_regions(answer, CITY))
         for answer in (LOCATION, LOCALIZATION)
     )
     layers = [
         *(cells_layer(CITY, identifiability=CHANCES), objects_layer(OBJECTS), lines),
-        *(hexagons_layer(CITY, 9, objects=OBJECTS, evaluation=EVALUATION), *split_figures(queries)),
+        *(hexagons_layer(CITY, 9, objects=OBJECTS, evaluation=EVALUATION), *queries.parts),
         *(layer for answer in answers for layer in answer),
     ]
     for layer in layers:

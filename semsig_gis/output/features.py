@@ -1,0 +1,82 @@
+"""Write a layer with a driver of GDAL, block by block."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import json
+import sqlite3
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+import pyogrio
+from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
+
+from semsig_gis.core import GEOMETRY, InputError
+from semsig_gis.output.layers.model import GEOMETRY_TYPES
+from semsig_gis.storage import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+    from pathlib import Path
+
+    from semsig_gis.output.layers.model import Layer, Progress
+
+
+def write_features(
+    layer: Layer,
+    path: str | Path,
+    driver: str,
+    progress: Progress,
+    **options: Any,  # noqa: ANN401 - as pyogrio has
+) -> None:
+    """Write a layer atomically with a driver of GDAL, and check the number of its rows."""
+    with whole_file(path) as partial, write_errors(path):
+        pyogrio.write_arrow(
+            feature_stream(layer, progress),
+            partial,
+            layer=layer.name,
+            driver=driver,
+            geometry_name=GEOMETRY,
+            geometry_type=GEOMETRY_TYPES[layer.geometry],
+            crs=layer.crs.to_wkt(),
+            **options,
+        )
+        if pyogrio.read_info(partial, force_feature_count=True)["features"] != layer.rows:
+            raise DataSourceError("some features are not in the file")
+
+
+def feature_stream(
+    layer: Layer, progress: Progress = None, *, without: Collection[str] = ()
+) -> pa.RecordBatchReader:
+    """Return the rows of a layer as a stream, without the columns in `without`."""
+    blocks = (
+        block.drop_columns([name for name in block.column_names if name in without])
+        for block in layer.blocks(progress)
+    )
+    first = next(blocks)
+    batches = (batch for block in itertools.chain([first], blocks) for batch in block.to_batches())
+    return pa.RecordBatchReader.from_batches(first.schema, batches)
+
+
+def geojson_options(description: str, metadata: Mapping[str, Any]) -> dict[str, str]:
+    """Return options of GDAL for GeoJSON of RFC 7946 with metadata in the member ``semsig``."""
+    native = {"type": "FeatureCollection", "semsig": metadata}
+    return {
+        "RFC7946": "YES",
+        "DESCRIPTION": description,
+        "NATIVE_DATA": json.dumps(native, allow_nan=False),
+        "NATIVE_MEDIA_TYPE": "application/vnd.geo+json",
+    }
+
+
+@contextlib.contextmanager
+def write_errors(path: str | Path) -> Iterator[None]:
+    """Convert errors of GDAL and SQLite while writing `path` into an `InputError`."""
+    try:
+        yield
+    except (DataSourceError, DataLayerError, FeatureError, sqlite3.Error) as error:
+        raise InputError(
+            f"{path} could not be written whole, so what was there before is unchanged; free "
+            "some space or choose another folder."
+        ) from error
