@@ -13,7 +13,7 @@ from semsig_gis.core import EmptyResultError, InputError, UnknownNameError, extr
 from semsig_gis.database import open_city, require_same_place
 from semsig_gis.localization import REGION_SHARE, search_regions
 from semsig_gis.objects import open_objects
-from semsig_gis.output.files import FORMATS, export_suffixes
+from semsig_gis.output.files import FORMATS, ONLY_ANSWERS
 from semsig_gis.output.layers import LAYERS, needed_results, used_results
 from semsig_gis.output.layers.answer import answer_layers
 from semsig_gis.output.layers.model import cell_raster
@@ -138,7 +138,7 @@ def export_database(
     True
     ['cells', 'objects', 'layer_styles']
     """
-    suffix = _suffix(path, export_suffixes("layer", "layers", "raster"))
+    suffix = _suffix(path, [f".{name}" for name in FORMATS if name not in ONLY_ANSWERS])
     options = {
         "objects": objects,
         "identifiability": identifiability,
@@ -333,7 +333,7 @@ def export_answer(
     ...     export_answer(answer, demo_database, f"{folder}/regions.gpkg").to_dict()["cells"]
     5
     """
-    suffix = _suffix(path, [name for name in export_suffixes() if not FORMATS[name[1:]].layers])
+    suffix = _suffix(path, [f".{name}" for name in FORMATS if not FORMATS[name].layers])
     write = FORMATS[suffix[1:]]
     if write.holds == "raster" and answer.chances is None:
         raise InputError(

@@ -42,6 +42,8 @@ class Writer:
         self.write(content, path, **options)
 
 
+ONLY_ANSWERS = frozenset({"kml"})  # known without importing their modules
+
 FORMATS: Registry[Writer] = Registry(
     "format",
     __name__,
@@ -60,6 +62,6 @@ def writer(holds: Content = "layer", **options: Any) -> Callable[[Callable[..., 
     return register
 
 
-def export_suffixes(*holds: Content) -> list[str]:
-    """Return the suffixes of the formats that hold something, by default of all."""
-    return [f".{name}" for name in FORMATS if not holds or FORMATS[name].holds in holds]
+def export_suffixes() -> list[str]:
+    """Return the suffixes of files of a database, without those of other packages."""
+    return [f".{name}" for name in FORMATS.names if name not in ONLY_ANSWERS]

@@ -39,7 +39,7 @@ def write_geoparquet(layer: Layer, path: str | Path, *, progress: Progress = Non
     geo["columns"][GEOMETRY]["covering"] = COVERING
     if not layer.rows:
         del geo["columns"][GEOMETRY]["bbox"]
-    specs = {**layer.facts, "kind": f"{layer.title} export".lower(), **layer.credits}
+    specs = {**layer.metadata, "kind": f"{layer.title} export".lower()}
 
     def blocks() -> Iterator[pa.Table]:
         for block in layer.blocks(progress):

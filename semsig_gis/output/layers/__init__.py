@@ -32,8 +32,8 @@ LAYERS: Registry[Callable[..., Layer]] = Registry(
 
 
 def layer_names() -> list[str]:
-    """Return the names of the layers of a city."""
-    return [*LAYERS]
+    """Return the names of the layers of a city, without those of other packages."""
+    return [*LAYERS.names]
 
 
 def needed_results(make: Callable[..., Any]) -> set[str]:

@@ -95,8 +95,9 @@ class Layer:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Facts and credits, for the metadata of a file."""
-        return {**self.facts, **self.credits}
+        """Facts, title and unit of each column, and credits, for the metadata of a file."""
+        columns = {item.name: {"title": item.title, "unit": item.unit} for item in self.columns}
+        return {**self.facts, "columns": columns, **self.credits}
 
     @property
     def metadata_texts(self) -> dict[str, str]:

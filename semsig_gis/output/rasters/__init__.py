@@ -25,5 +25,5 @@ RASTERS: Registry[Callable[..., Raster]] = Registry(
 
 
 def raster_names() -> list[str]:
-    """Return the names of the rasters of a city."""
-    return [*RASTERS]
+    """Return the names of the rasters of a city, without those of other packages."""
+    return [*RASTERS.names]

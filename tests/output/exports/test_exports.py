@@ -37,13 +37,6 @@ OF_OBJECTS: dict[str, Any] = {"objects": OBJECTS}
 OF_QUERIES: dict[str, Any] = {"evaluation": small_evaluation()}
 TABLES = (".gpkg", ".parquet", ".fgb", ".geojson", ".csv")
 ALL = (*TABLES, ".pmtiles", ".tif")
-GIVEN: dict[str, dict[str, Any]] = {
-    "cells": {},
-    "objects": OF_OBJECTS,
-    "evaluation": OF_QUERIES,
-    "evaluation_lines": OF_QUERIES,
-    "hexagons": {"h3": 11},
-}
 
 
 def test_geopackage_contains_all_or_the_chosen_layers(tmp_path: Path) -> None:
@@ -56,18 +49,6 @@ def test_geopackage_contains_all_or_the_chosen_layers(tmp_path: Path) -> None:
     export_database(CITY, file, layers=names, **OF_QUERIES)
     names += ["evaluation_figures", "layer_styles"]
     assert pyogrio.list_layers(file)[:, 0].tolist() == names
-
-
-@pytest.mark.parametrize("layer", [*LAYERS])
-def test_other_formats_contain_one_layer(layer: str, tmp_path: Path) -> None:
-    for suffix in TABLES:
-        export_database(CITY, tmp_path / f"a{suffix}", layers=[layer], **GIVEN[layer])
-    expected = gpd.read_file(tmp_path / "a.gpkg", layer=layer)
-    readers = {".csv": pd.read_csv, ".parquet": gpd.read_parquet}
-    for suffix in TABLES[1:]:
-        table = readers.get(suffix, gpd.read_file)(tmp_path / f"a{suffix}")
-        assert set(expected.columns) - {"geometry"} <= set(table.columns)
-        assert len(table) == len(expected) > 10
 
 
 LOCATION = small_location()
