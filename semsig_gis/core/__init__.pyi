@@ -133,7 +133,6 @@ from .symbology import WHITE as WHITE
 from .symbology import ClassSign as ClassSign
 from .symbology import Mark as Mark
 from .symbology import class_signs as class_signs
-from .symbology import group_labels as group_labels
 from .symbology import mixed as mixed
 from .tables import Table as Table
 from .tables import figure as figure

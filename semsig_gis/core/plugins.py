@@ -1,4 +1,4 @@
-"""Catalogues, readers, commands and formats of other installed packages, found by their entry points.
+"""Catalogues, readers, commands and formats of other packages, found by their entry points.
 
 ``data_sources/README.md`` shows how a package declares them. Its code is imported only when one
 of the functions below is called.

@@ -56,7 +56,7 @@ def test_city_across_180_degrees_has_its_true_size(crs: str) -> None:
     place = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(180.0, -16.8)
     x, y = (10.0 * round(side / 10.0) - 200.0 for side in place)
     city = a_city(*scattered(40, 0.5), crs=crs, origin=(x, y))
-    _, ((south, west), (north, east)) = city_image(city, SHADES)
+    _, ((south, west), (north, east)) = city_image(city)
     assert 0 < east - west < 0.005
     assert 0 < north - south < 0.005
     assert min(abs(west - 180.0), abs(west + 180.0)) < 0.005
@@ -105,7 +105,7 @@ def test_cells_are_at_their_places_in_the_image(
     side: int, crs: str, origin: tuple[float, float]
 ) -> None:
     database = a_city(*scattered(side, 0.4), crs=crs, origin=origin)
-    image, bounds = city_image(database, SHADES)
+    image, bounds = city_image(database)
     # A pixel is at most half a cell wide, so the middle of a cell always has the cell's shade.
     expected = np.digitize(database.lengths, list(SHADES))
     assert (indices_at(image, bounds, database.xy, database.crs) == expected).all()
@@ -118,13 +118,13 @@ def test_cells_are_at_their_places_in_the_image(
 
 def test_city_of_one_cell_has_an_image() -> None:
     database = a_city(np.array([-5]), np.array([3]))
-    image, bounds = city_image(database, SHADES)
+    image, bounds = city_image(database)
     assert indices_at(image, bounds, database.xy, database.crs).all()
     assert 0 < np.diff(bounds, axis=0).min() <= np.diff(bounds, axis=0).max() < 2e-4
 
 
 def test_image_has_the_palette_and_at_most_2048_pixels() -> None:
-    image, _ = city_image(a_city(*scattered(500, 0.3)), SHADES)
+    image, _ = city_image(a_city(*scattered(500, 0.3)))
     pixels, palette = decoded(image)
     assert palette[3:] == bytes.fromhex("e0e0e0a0a0a0505050")
     assert 1000 <= min(pixels.shape) <= max(pixels.shape) <= 2048
@@ -134,7 +134,7 @@ def test_image_has_the_palette_and_at_most_2048_pixels() -> None:
 def test_blocks_of_a_wide_city_show_means(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(map_image, "_BLOCKS", 50)
     database = a_city(*scattered(140, 0.5))
-    image, bounds = city_image(database, SHADES)
+    image, bounds = city_image(database)
     assert max(decoded(image)[0].shape) <= 100
     block = 3
     places = np.stack([database.columns, database.rows], axis=1) // block
