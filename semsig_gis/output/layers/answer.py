@@ -109,7 +109,12 @@ def answer_layers(
             description="Where the query may have been seen from, the best first.",
             geometry="polygon",
             form=REGION_FORM,
-            display=Display(level=6, group=GROUP, name="""'region ' || "rank" """),
+            display=Display(
+                level=6,
+                group=GROUP,
+                name="""'region ' || "rank" """,
+                tip=("chance", "km2", "searched_percent"),
+            ),
             styles=(by_rank("rank", geometry="polygon"),),
         ),
         layer(
@@ -120,7 +125,12 @@ def answer_layers(
             geometry="point",
             form=CANDIDATE_FORM,
             display=Display(
-                level=7, group=GROUP, name=f"'candidate ' || {RANK}", label=CANDIDATE_LABEL
+                level=7,
+                group=GROUP,
+                name=f"'candidate ' || {RANK}",
+                signature=("types", "bearings", "distances", " "),
+                tip=("chance", "distance"),
+                label=CANDIDATE_LABEL,
             ),
             styles=(by_rank(str(answer.candidates.columns[0]), geometry="point"),),
         ),
@@ -138,7 +148,12 @@ def answer_layers(
         description="Where the query was most probably seen from, and how sure that is.",
         geometry="point",
         form=PLACE_FORM,
-        display=Display(level=8, group=GROUP, name="""'place, answer ' || "answer" """),
+        display=Display(
+            level=8,
+            group=GROUP,
+            name="""'place, answer ' || "answer" """,
+            tip=("chance", "elsewhere", "sigma"),
+        ),
         styles=(by_answer(),),
     )
     return [*layers, estimate]

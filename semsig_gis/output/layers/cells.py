@@ -38,7 +38,7 @@ chance_near = ["Chance given to places near", "Expected, of the answer to a quer
 chance_itself = ["Chance given to the cell", "Expected, of the answer to a query from here, from 0 to 1.", "1", 3]
 bits_left = ["Bits left to be known", "Expected entropy of the answer to a query from here.", "", 2]
 ["What it is mistaken for"]
-"lookalike_#" = ["Confused with cell: {}", "Number of a cell far away that a query from here is mistaken for."]
+"lookalike_#" = ["Confused cell {}", "Number of a cell far away that a query from here is mistaken for."]
 "lookalike_#_chance" = ["Chance of confused cell {}", "Expected chance given to its surroundings.", "", 4]
 ["Gain by class"]
 "gain_*" = ["Gain by: {}", "By how much the chance of places near rises because such objects are known.", "", 4]
@@ -47,7 +47,13 @@ cell_id = ["Cell", "Number of the cell in the grid."]
 x = ["Viewpoint, east", "In the coordinate system of the layer.", "m", 2]
 y = ["Viewpoint, north", "In the coordinate system of the layer.", "m", 2]
 """)  # noqa: E501
-DISPLAY = Display(level=0, group="City", name="""'cell ' || "cell_id" || ', ' || "types" """)
+DISPLAY = Display(
+    level=0,
+    group="City",
+    name="""'cell ' || "cell_id" || ', ' || "types" """,
+    signature=("types", "bearings", "distances", " "),
+    tip=("type_group_size", "chance_found", "lookalike_1"),
+)
 
 
 @LAYERS.register

@@ -85,7 +85,13 @@ def evaluation_layer(evaluation: Evaluation, database: SignatureDatabase) -> Lay
         ),
         geometry="point",
         form=QUERY_FORM,
-        display=Display(level=5, group=GROUP, name=QUERY_NAME),
+        display=Display(
+            level=5,
+            group=GROUP,
+            name=QUERY_NAME,
+            signature=("query_types", "query_bearings", "query_ranges", ","),
+            tip=("error_m", "rank_low"),
+        ),
         styles=(by_outcome(geometry="point"),),
         **evaluation_facts(evaluation, database),
     )

@@ -55,7 +55,7 @@ def evaluation_lines_layer(evaluation: Evaluation, database: SignatureDatabase) 
         description="Each query's true place, joined to the best place that was found for it.",
         geometry="line",
         form=FORM,
-        display=Display(level=4, group=GROUP, name=QUERY_NAME, hidden=True),
+        display=Display(level=4, group=GROUP, name=QUERY_NAME, tip=("off_m",), hidden=True),
         styles=(by_outcome(geometry="line"),),
         **evaluation_facts(evaluation, database),
     )

@@ -41,7 +41,12 @@ queries = ["Queries", "How many queries of the evaluation are from it."]
 found = ["Share found", "Of these queries, from 0 to 1.", "1", 3]
 """)
 DISPLAY = Display(
-    level=2, group="City", name="""'hexagon ' || "h3" """, farther=25000, covers="cells"
+    level=2,
+    group="City",
+    name="""'hexagon ' || "h3" """,
+    tip=("cells", "objects", "chance_found", "found"),
+    farther=25000,
+    covers="cells",
 )
 
 

@@ -41,7 +41,11 @@ class Display:
 
     level: int = 0  # of two layers, that with the higher level is drawn on top
     group: str = "Layers"  # of the legend
-    name: str = ""  # expression for the name of a feature in lists and searches
+    name: str = ""  # expression for the name of a feature in lists, searches and map tips
+    # Columns of symbols, bearings and distances of a compass wheel in map tips, and what separates
+    # the numbers; and columns that a map tip lists.
+    signature: tuple[str, str, str, str] | None = None
+    tip: tuple[str, ...] = ()
     label: str = ""  # expression of the label on the map
     # The layer is hidden where the denominator of the scale is greater or smaller.
     nearer: int = 0

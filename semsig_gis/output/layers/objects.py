@@ -42,6 +42,7 @@ DISPLAY = Display(
     level=1,
     group="City",
     name="""coalesce("title", "class_name") || coalesce(' ' || "source_id", '')""",
+    tip=("source", "count"),
     nearer=6000,
 )
 
