@@ -23,40 +23,65 @@ if TYPE_CHECKING:
     from semsig_gis.output.layers.model import Layer, Progress
 
 
-def write_features(
+def write_file(
     layer: Layer,
     path: str | Path,
     driver: str,
     progress: Progress,
     **options: Any,  # noqa: ANN401 - as pyogrio has
 ) -> None:
-    """Write a layer atomically with a driver of GDAL, and check the number of its rows."""
+    """Write a layer as one file, atomically, with a driver of GDAL."""
     with whole_file(path) as partial, write_errors(path):
-        pyogrio.write_arrow(
-            feature_stream(layer, progress),
-            partial,
-            layer=layer.name,
-            driver=driver,
-            geometry_name=GEOMETRY,
-            geometry_type=GEOMETRY_TYPES[layer.geometry],
-            crs=layer.crs.to_wkt(),
-            **options,
-        )
+        write_features(layer, partial, driver, progress, **options)
         if pyogrio.read_info(partial, force_feature_count=True)["features"] != layer.rows:
             raise DataSourceError("some features are not in the file")
 
 
-def feature_stream(
-    layer: Layer, progress: Progress = None, *, without: Collection[str] = ()
-) -> pa.RecordBatchReader:
-    """Return the rows of a layer as a stream, without the columns in `without`."""
+def write_features(
+    layer: Layer,
+    path: Path,
+    driver: str,
+    progress: Progress = None,
+    *,
+    without: Collection[str] = (),
+    **options: Any,  # noqa: ANN401 - as pyogrio has
+) -> None:
+    """Write the rows of a layer with a driver of GDAL, without the columns in `without`."""
     blocks = (
         block.drop_columns([name for name in block.column_names if name in without])
         for block in layer.blocks(progress)
     )
     first = next(blocks)
-    batches = (batch for block in itertools.chain([first], blocks) for batch in block.to_batches())
-    return pa.RecordBatchReader.from_batches(first.schema, batches)
+    errors: list[BaseException] = []
+
+    def batches() -> Iterator[pa.RecordBatch]:
+        try:
+            for block in itertools.chain([first], blocks):
+                yield from block.to_batches()
+        except BaseException as error:
+            errors.append(error)
+            raise
+
+    code = layer.crs.to_epsg()
+    geometry = {
+        "geometry_name": GEOMETRY,
+        "geometry_type": GEOMETRY_TYPES.get(layer.geometry),
+        "crs": layer.crs.to_wkt() if code is None else f"EPSG:{code}",
+    }
+    try:
+        pyogrio.write_arrow(
+            pa.RecordBatchReader.from_batches(first.schema, batches()),
+            path,
+            layer=layer.name,
+            driver=driver,
+            **(geometry if layer.geometry in GEOMETRY_TYPES else {}),
+            **options,
+        )
+    except RuntimeError:
+        # pyogrio raises this in place of an error of the stream, such as an interruption.
+        if errors:
+            raise errors[0] from None
+        raise
 
 
 def geojson_options(description: str, metadata: Mapping[str, Any]) -> dict[str, str]:

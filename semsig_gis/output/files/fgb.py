@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from semsig_gis.output.features import write_features
+from semsig_gis.output.features import write_file
 from semsig_gis.output.files import writer
 
 if TYPE_CHECKING:
@@ -21,6 +21,4 @@ def write_flatgeobuf(layer: Layer, path: str | Path, *, progress: Progress = Non
     """
     options = {"TITLE": layer.title, "DESCRIPTION": layer.abstract}
     metadata = layer.metadata_texts
-    write_features(
-        layer, path, "FlatGeobuf", progress, layer_metadata=metadata, layer_options=options
-    )
+    write_file(layer, path, "FlatGeobuf", progress, layer_metadata=metadata, layer_options=options)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from semsig_gis.output.features import geojson_options, write_features
+from semsig_gis.output.features import geojson_options, write_file
 from semsig_gis.output.files import writer
 from semsig_gis.output.files.answers import write_answer_geojson
 
@@ -22,4 +22,4 @@ def write_geojson(layer: Layer, path: str | Path, *, progress: Progress = None) 
     specs, the classes and the licences.
     """
     options = geojson_options(layer.abstract, layer.metadata)
-    write_features(layer, path, "GeoJSON", progress, layer_options=options)
+    write_file(layer, path, "GeoJSON", progress, layer_options=options)

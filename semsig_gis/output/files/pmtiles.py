@@ -9,12 +9,11 @@ import sqlite3
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
-import pyogrio
 from pmtiles.tile import Compression, TileType, zxy_to_tileid
 from pmtiles.writer import Writer
 
 from semsig_gis.core import GEOMETRY, InputError, to_degrees
-from semsig_gis.output.features import feature_stream, write_errors
+from semsig_gis.output.features import write_errors, write_features
 from semsig_gis.output.files import writer
 from semsig_gis.storage import whole_file
 
@@ -115,16 +114,8 @@ def _zooms(cells: Layer, *, latitude: float) -> range:
 
 def _tiles(layer: Layer, zoom: int, scratch: Path) -> Iterator[tuple[int, bytes]]:
     """Yield the id and the content of each tile of a zoom, in order of the ids."""
-    pyogrio.write_arrow(
-        feature_stream(layer, without=OMITTED_COLUMNS),
-        scratch,
-        layer=layer.name,
-        driver="MBTiles",
-        geometry_name=GEOMETRY,
-        geometry_type="Polygon",
-        crs=layer.crs.to_wkt(),
-        dataset_options={**OPTIONS, "MINZOOM": str(zoom), "MAXZOOM": str(zoom)},
-    )
+    options = {**OPTIONS, "MINZOOM": str(zoom), "MAXZOOM": str(zoom)}
+    write_features(layer, scratch, "MBTiles", without=OMITTED_COLUMNS, dataset_options=options)
     with contextlib.closing(sqlite3.connect(scratch)) as tiles:
         # MBTiles count rows from the south, PMTiles from the north.
         north, query = (1 << zoom) - 1, "SELECT tile_column, tile_row FROM tiles"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
 import sqlite3
 from dataclasses import dataclass
@@ -36,13 +35,13 @@ from semsig_gis.core import (
 from semsig_gis.database import database_of
 from semsig_gis.evaluation import identifiability_of
 from semsig_gis.objects import objects_of
-from semsig_gis.output.features import write_errors
+from semsig_gis.output.features import write_errors, write_features
 from semsig_gis.output.layers.model import GEOMETRY_TYPES
 from semsig_gis.output.qgis.project import layer_style, project_archive, shown_layers
 from semsig_gis.storage import parse_json, whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import DTypeLike
 
@@ -286,45 +285,32 @@ def write_layers(layers: Sequence[Layer], path: str | Path, *, progress: Progres
     """
     target = Path(path)
     _require_closed(target)
-    rows = sum(layer.rows for layer in layers)
+    rows, written = sum(layer.rows for layer in layers), 0
+
+    def advance(done: int, _: int) -> None:
+        if progress is not None:
+            progress(written + done, rows)
+
     with whole_file(target) as partial:
         with write_errors(target):
-            blocks = (_write_layer(layer, partial) for layer in layers)
-            for written in itertools.accumulate(itertools.chain.from_iterable(blocks)):
-                if progress is not None:
-                    progress(written, rows)
+            for layer in layers:
+                # The metadata belong to the layer: for metadata of the file, GDAL would write a
+                # copy into the folder whenever the file is read.
+                write_features(
+                    layer,
+                    partial,
+                    "GPKG",
+                    advance,
+                    append=partial.exists() and partial.stat().st_size > 0,
+                    dataset_options={"VERSION": VERSION},
+                    layer_metadata=layer.metadata_texts,
+                    layer_options={"IDENTIFIER": layer.title, "DESCRIPTION": layer.abstract},
+                )
+                written += layer.rows
             _write_styles(layers, partial, target.name)
             _check_indexes(layers, partial)
         # Another program may have opened the old file in the meantime.
         _require_closed(target)
-
-
-def _write_layer(layer: Layer, path: Path) -> Iterator[int]:
-    """Write one layer block by block, and yield the number of rows of each block."""
-    code = layer.crs.to_epsg()
-    # The metadata belong to the layer: for metadata of the file, GDAL would write a copy into the
-    # folder whenever the file is read.
-    first: dict[str, Any] = {
-        "layer_metadata": layer.metadata_texts,
-        "layer_options": {"IDENTIFIER": layer.title, "DESCRIPTION": layer.abstract},
-    }
-    geometry = {
-        "geometry_name": GEOMETRY,
-        "geometry_type": GEOMETRY_TYPES.get(layer.geometry),
-        "crs": layer.crs.to_wkt() if code is None else f"EPSG:{code}",
-    }
-    for number, block in enumerate(layer.blocks()):
-        pyogrio.write_arrow(
-            block,
-            path,
-            layer=layer.name,
-            driver="GPKG",
-            **(geometry if layer.geometry in GEOMETRY_TYPES else {}),
-            append=number > 0,
-            dataset_options={"VERSION": VERSION},
-            **(first if number == 0 else {}),
-        )
-        yield len(block)
 
 
 def _write_styles(layers: Sequence[Layer], path: Path, file: str) -> None:

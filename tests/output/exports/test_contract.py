@@ -160,6 +160,21 @@ def test_progress_ends_at_the_total(suffix: str, tmp_path: Path) -> None:
     assert steps[-1] == (total, total)
 
 
+@pytest.mark.parametrize("suffix", [*TABLES, "pmtiles"])
+def test_interruption_leaves_the_old_file(suffix: str, tmp_path: Path) -> None:
+    file = tmp_path / f"a.{suffix}"
+    export(file, "cells")
+    before = file.read_bytes()
+
+    def stop(*_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export(file, "cells", progress=stop)
+    assert file.read_bytes() == before
+    assert [*tmp_path.iterdir()] == [file]
+
+
 @pytest.mark.parametrize("suffix", TABLES)
 def test_layer_without_rows_has_its_columns(suffix: str, tmp_path: Path) -> None:
     evaluation = RESULTS["evaluation"]
