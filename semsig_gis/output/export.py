@@ -151,7 +151,7 @@ def export_database(
     write = FORMATS[suffix[1:]]
     kinds: Registry[Callable[..., Any]] = RASTERS if write.holds == "raster" else LAYERS
     names = _content(
-        path, [layers] if isinstance(layers, str) else layers, write=write, given=results
+        path, [layers] if isinstance(layers, str) else layers, write=write, results=results
     )
     _require_same_city(path, database, objects, evaluation)
     if write.cells is not None:
@@ -192,7 +192,7 @@ def _require_same_city(
 
 
 def _content(
-    path: str | Path, names: Sequence[str], *, write: Writer, given: Mapping[str, object]
+    path: str | Path, names: Sequence[str], *, write: Writer, results: Mapping[str, object]
 ) -> list[str]:
     """Return the names of the layers or the raster to write.
 
@@ -212,9 +212,9 @@ def _content(
             f"{path} can contain only one layer, but {' and '.join(names)} were given; give one of "
             "them, or write a GeoPackage."
         )
-    missing = {name: needed_results(kinds[name]) - given.keys() for name in accepted}
+    missing = {name: needed_results(kinds[name]) - results.keys() for name in accepted}
     default = AMBIGUITY if write.holds == "raster" else CELLS
-    if "resolution" in given and HEXAGONS in accepted:
+    if "resolution" in results and HEXAGONS in accepted:
         default = HEXAGONS
     possible = [name for name in accepted if not missing[name]]
     content = list(dict.fromkeys(names)) or (possible if many else [default])
@@ -227,7 +227,7 @@ def _content(
     # Identifiability is a property of the database, so it never counts as unused.
     used = {"identifiability"}.union(*(used_results(kinds[name]) for name in content))
     used -= {"geometry"} if write.cells is None else set()
-    unused = sorted(given.keys() - used)
+    unused = sorted(results.keys() - used)
     if unused:
         raise InputError(
             f"{path} contains only the {' and '.join(content)}, not the {' or '.join(unused)}; "

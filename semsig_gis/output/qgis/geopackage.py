@@ -287,9 +287,9 @@ def write_layers(layers: Sequence[Layer], path: str | Path, *, progress: Progres
     _require_closed(target)
     rows, written = sum(layer.rows for layer in layers), 0
 
-    def advance(done: int, _: int) -> None:
+    def advance(count: int, _: int) -> None:
         if progress is not None:
-            progress(written + done, rows)
+            progress(written + count, rows)
 
     with whole_file(target) as partial:
         with write_errors(target):
