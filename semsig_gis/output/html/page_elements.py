@@ -568,8 +568,9 @@ def class_bar(colours: Sequence[str], breaks: Sequence[str]) -> str:
 
 def shades_part() -> str:
     """Return the legend of the image that `add_city` adds."""
-    signs = " &ensp;".join(
-        f"{swatch(colour, FLIPPING)}{label}" for _, _, label, colour in SEEN.ranges
+    signs = " ".join(
+        f"<span style='white-space:nowrap'>{swatch(colour, FLIPPING)}{label}</span>"
+        for _, _, label, colour in SEEN.ranges
     )
     name = "Objects seen from a cell"
     return layer_part(name, f"<p>{name}<br>{signs}</p>")
