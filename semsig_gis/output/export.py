@@ -351,7 +351,7 @@ def export_answer(
     if write.write_answer is not None:
         write.write_answer(layers, path)
     else:
-        write(layers if write.holds == "answer" else layers[0], path)
+        write(layers[0] if write.holds == "layer" else layers, path)
     return regions
 
 

@@ -9,10 +9,10 @@ import functools
 import io
 import math
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import lazy_loader
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     import jinja2
 
+    from semsig_gis.core import ClassSign
     from semsig_gis.output.layers.columns import Column
     from semsig_gis.output.layers.model import Layer
     from semsig_gis.output.layers.styles import Style
@@ -39,15 +40,6 @@ MAP_WIDTH, MAP_HEIGHT, BAR = 0.205, 0.160, 0.022
 SCALES = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.5)
 BARS = (1.0, 2.0, 5.0)
 CREDIT_LETTERS, CREDITS = 300, 7
-
-
-class TipSign(NamedTuple):
-    """The sign of a class in a map tip."""
-
-    symbol: str
-    colour: str
-    ink: str
-    text: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,19 +88,14 @@ class ShownLayer:
         return in_range and not display.hidden and bool(self.layer.styles)
 
     @property
-    def signs(self) -> list[TipSign]:
-        """Signs of the classes; titles are HTML inside a string of an expression."""
+    def signs(self) -> list[ClassSign]:
+        """Signs of the classes; the titles are HTML inside a string of an expression."""
         escapes = str.maketrans({"'": "''", "[": "&#91;", "]": "&#93;"})
         taxonomy = self.layer.taxonomy
         signs = [] if taxonomy is None else [*class_signs(taxonomy).values()]
         titles = shown_lines(sign.title for sign in signs)
         return [
-            TipSign(
-                symbol=sign.symbol,
-                colour=sign.colour,
-                ink=sign.ink,
-                text=escape(title, quote=False).translate(escapes),
-            )
+            replace(sign, title=escape(title, quote=False).translate(escapes))
             for sign, title in zip(signs, titles, strict=True)
         ]
 
