@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import logging
 import os
 import shutil
@@ -302,3 +303,24 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
             return place / "out"
     shutil.copytree(whole, place, dirs_exist_ok=True)
     return place / "out"
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    """Return what puts a distribution on the path, with one module, as an installer leaves it."""
+    site, modules = tmp_path / "site", []
+    monkeypatch.syspath_prepend(site)
+
+    def install(package: str, group: str, code: str, **entries: str) -> None:
+        info = site / f"{package}-1.0.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+        modules.append(f"a_module_of_{package}")
+        lines = [f"[{group}]", *(f"{name} = {modules[-1]}:{it}" for name, it in entries.items())]
+        (info / "entry_points.txt").write_text("\n".join(lines), encoding="utf-8")
+        (site / f"{modules[-1]}.py").write_text(code, encoding="utf-8")
+        importlib.invalidate_caches()
+
+    yield install
+    for module in modules:  # another test may have a module of that name
+        sys.modules.pop(module, None)

@@ -11,6 +11,7 @@ from typing_extensions import TypedDict
 from semsig_gis.commands.model import Option, Reporter, Result, command
 from semsig_gis.commands.options import Database, Smooth, known_identifiability
 from semsig_gis.core import InputError
+from semsig_gis.output import export_suffixes, layer_names, raster_names
 
 
 def _layers() -> tuple[str, ...]:
@@ -36,9 +37,9 @@ class Export:
     out: Annotated[
         Path,
         Option(
-            "File to write. Its suffix is the format: .gpkg (all layers, for QGIS), .parquet, "
-            ".fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), .tif (one number "
-            "per cell) or .json (STAC item).",
+            f"File to write. Its suffix is the format: {', '.join(export_suffixes())} or .json. "
+            "A .gpkg (for QGIS) has all layers, .pmtiles (for web maps) the cells, .tif a raster "
+            "of the cells, .json a description (STAC item), and other formats one layer.",
             title="File",
             writes=(".gpkg", ""),
         ),
@@ -58,9 +59,8 @@ class Export:
     layer: Annotated[
         list[str] | None,
         Option(
-            "Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; by default "
-            "cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the default), "
-            "identifiability, error, or field (share of the queries around that fail).",
+            f"Layer to write, by default cells, in a .gpkg all: {', '.join(layer_names())} (repeat "
+            f"for several). In a .tif, by default ambiguity: {', '.join(raster_names())}.",
             title="Layers",
             metavar="NAME",
             suggestions=_layers,

@@ -77,10 +77,14 @@ from .parallel import finish_tasks as finish_tasks
 from .parallel import run_tasks as run_tasks
 from .plugins import CATALOGS as CATALOGS
 from .plugins import COMMANDS as COMMANDS
+from .plugins import EXPORTS as EXPORTS
+from .plugins import LAYERS as LAYERS
+from .plugins import RASTERS as RASTERS
 from .plugins import READERS as READERS
 from .plugins import installed_catalogs as installed_catalogs
 from .plugins import installed_command_names as installed_command_names
 from .plugins import installed_commands as installed_commands
+from .plugins import installed_outputs as installed_outputs
 from .plugins import installed_readers as installed_readers
 from .presentation import map_with as map_with
 from .presentation import plot_with as plot_with
@@ -129,7 +133,6 @@ from .symbology import WHITE as WHITE
 from .symbology import ClassSign as ClassSign
 from .symbology import Mark as Mark
 from .symbology import class_signs as class_signs
-from .symbology import group_labels as group_labels
 from .symbology import mixed as mixed
 from .tables import Table as Table
 from .tables import figure as figure

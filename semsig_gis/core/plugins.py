@@ -1,4 +1,4 @@
-"""Catalogues, readers and commands of other installed packages, found by their entry points.
+"""Catalogues, readers, commands and formats of other packages, found by their entry points.
 
 ``data_sources/README.md`` shows how a package declares them. Its code is imported only when one
 of the functions below is called.
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 CATALOGS = "semsig_gis.catalogs"
 READERS = "semsig_gis.readers"
 COMMANDS = "semsig_gis.commands"
+EXPORTS = "semsig_gis.exports"
+LAYERS = "semsig_gis.layers"
+RASTERS = "semsig_gis.rasters"
 
 
 def installed_catalogs(*, reserved: Collection[str] = ()) -> Mapping[str, Path]:
@@ -56,6 +59,15 @@ def installed_commands(*, reserved: Collection[str] = ()) -> Mapping[str, Callab
     a class is skipped with a warning.
     """
     return _installed(COMMANDS, _function, reserved, InputError)
+
+
+def installed_outputs(group: str, reserved: Collection[str] = ()) -> Mapping[str, Any]:
+    """Return the layers, the rasters or the formats of files of other packages by name, sorted.
+
+    InputError if a name is in `reserved` or provided twice. An entry that fails to load or is not
+    a function is skipped with a warning.
+    """
+    return _installed(group, _function, reserved, InputError)
 
 
 def _installed(

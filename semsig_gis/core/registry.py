@@ -19,8 +19,8 @@ class Registry(Generic[T]):
     """Objects of a kind by name. Each module of `package` registers one under its own name.
 
     To add one, add its module. A module is imported when its object is used, so that the names are
-    known at no cost. `installed` returns the objects of other packages; it takes the names that
-    they cannot have.
+    known at no cost. Modules in `without` register nothing. `installed` returns the objects of
+    other packages; it takes the names that they cannot have.
     """
 
     def __init__(
@@ -29,10 +29,13 @@ class Registry(Generic[T]):
         package: str,
         path: Iterable[str],
         installed: Callable[[tuple[str, ...]], Mapping[str, T]] = lambda _: {},
+        *,
+        without: Iterable[str] = (),
     ) -> None:
         self._kind, self._package, self._installed = kind, package, installed
         self._objects: dict[str, Any] = {}
-        self.names = tuple(module.name for module in pkgutil.iter_modules(path))
+        modules = (module.name for module in pkgutil.iter_modules(path))
+        self.names = tuple(name for name in modules if name not in {*without})
         """Names of the modules, in alphabetical order."""
 
     def register(self, value: Registered, module: str | None = None) -> Registered:

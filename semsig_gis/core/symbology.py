@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -207,13 +206,6 @@ GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
     }
 )
 """Colour of a cell by the minimum number of cells with its signature, itself included."""
-
-
-def group_labels() -> list[str]:
-    """Return the legend text of each of `GROUP_COLOURS`."""
-    starts = list(GROUP_COLOURS)[1:]
-    between = [f"{low:,} to {high - 1:,}" for low, high in itertools.pairwise(starts)]
-    return ["no other", *between, f"{starts[-1]:,} or more"]
 
 
 SAME_TYPES, SAME_LEVELS = "#f5f5ff", "#ffd43b"

@@ -1,10 +1,7 @@
 """Write databases, evaluations and answers to files; the suffix gives the format.
 
-``.gpkg`` (`output.qgis`) holds many layers, with styles for QGIS; ``.parquet``, ``.fgb``,
-``.geojson`` and ``.csv`` (`output.files.tables`) hold one layer; ``.pmtiles``
-(`output.files.tiles`) holds the cells by zoom, and ``.tif`` (`output.qgis.rasters`) one number per
-cell. For an answer, ``.geojson`` and ``.kml`` (`output.files.answers`) hold all its layers.
-``.json`` (`output.files.stac`) describes a database.
+`output.files` has the formats, `output.layers` and `output.rasters` what they hold. ``.json``
+(`output.stac`) describes a database.
 """
 
 from __future__ import annotations
@@ -12,80 +9,35 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from semsig_gis.core import EmptyResultError, InputError, UnknownNameError, extra, nearest_name
 from semsig_gis.database import open_city, require_same_place
-from semsig_gis.evaluation import error_field
 from semsig_gis.localization import REGION_SHARE, search_regions
 from semsig_gis.objects import open_objects
-from semsig_gis.output.files.answers import write_answer_geojson, write_answer_kml
-from semsig_gis.output.files.tables import (
-    write_csv,
-    write_flatgeobuf,
-    write_geojson,
-    write_geoparquet,
-)
-from semsig_gis.output.files.tiles import write_pmtiles
+from semsig_gis.output.files import FORMATS, ONLY_ANSWERS
+from semsig_gis.output.layers import LAYERS, needed_results, used_results
 from semsig_gis.output.layers.answer import answer_layers
-from semsig_gis.output.layers.cells import cells_layer
-from semsig_gis.output.layers.evaluation import evaluation_layers, split_figures
-from semsig_gis.output.layers.hexagons import hexagons_layer
-from semsig_gis.output.layers.objects import objects_layer
-from semsig_gis.output.qgis import geopackage
-from semsig_gis.output.qgis.rasters import cell_errors, export_field, export_geotiff
+from semsig_gis.output.layers.model import cell_raster
+from semsig_gis.output.layers.styles import CHANCES
+from semsig_gis.output.rasters import RASTERS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from semsig_gis.core import Registry
     from semsig_gis.database import CellGeometry, SignatureDatabase
     from semsig_gis.evaluation import Evaluation, Identifiability
     from semsig_gis.localization import Answer, SearchRegions
     from semsig_gis.objects import StreetObjects
-    from semsig_gis.output.layers.model import Layer
-
-LAYERS = ("cells", "objects", "evaluation", "evaluation_lines", "hexagons")
-"""Layers that `export_database` writes."""
-
-RASTERS = ("ambiguity", "identifiability", "error", "field")
-"""Rasters that `export_database` writes."""
+    from semsig_gis.output.files import Writer
 
 ITEM = ".json"
 """Suffix of a STAC item, which describes the files of a database."""
 
-_MANY_LAYERS = {".gpkg": geopackage.write_layers}
-_ONE_LAYER: Mapping[str, Callable[..., None]] = {
-    ".parquet": write_geoparquet,
-    ".fgb": write_flatgeobuf,
-    ".geojson": write_geojson,
-    ".csv": write_csv,
-}
 RASTER_FACTS = ("query", "north", "prior", "elsewhere", "fit", "notes")
-_RASTER = frozenset({".tif", ".tiff"})
-_TILES = ".pmtiles"
-# Accepted layers or rasters by suffix; the first is the default.
-_CONTENT: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys((*_MANY_LAYERS, *_ONE_LAYER), LAYERS),
-    _TILES: ("cells",),
-    **dict.fromkeys(sorted(_RASTER), RASTERS),
-}
-# Formats that hold all layers of an answer in one file.
-_ANSWER: Mapping[str, Callable[..., None]] = {
-    **_MANY_LAYERS,
-    ".geojson": write_answer_geojson,
-    ".kml": write_answer_kml,
-}
-# The option that a layer or a raster needs in addition to the cells.
-_NEEDS = {
-    "objects": "objects",
-    **dict.fromkeys(("evaluation", "evaluation_lines", "error", "field"), "evaluation"),
-    "identifiability": "identifiability",
-    "hexagons": "resolution",
-}
-# Options that a layer or a raster uses where they are given.
-_USES = {"cells": {"geometry"}, "field": {"smoothing"}, "hexagons": {"objects", "evaluation"}}
+# Other suffixes of a format.
+ALIASES = {".tiff": ".tif"}
+# Layers and raster of a file by default, if it holds only one; hexagons if a resolution is given.
+CELLS, HEXAGONS, AMBIGUITY = "cells", "hexagons", "ambiguity"
 
 
 def export_database(
@@ -186,7 +138,7 @@ def export_database(
     True
     ['cells', 'objects', 'layer_styles']
     """
-    suffix = _suffix(path, _CONTENT)
+    suffix = _suffix(path, [f".{name}" for name in FORMATS if name not in ONLY_ANSWERS])
     options = {
         "objects": objects,
         "identifiability": identifiability,
@@ -195,57 +147,27 @@ def export_database(
         "smoothing": smooth,
         "resolution": h3,
     }
+    results: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    write = FORMATS[suffix[1:]]
+    kinds: Registry[Callable[..., Any]] = RASTERS if write.holds == "raster" else LAYERS
     names = _content(
-        path,
-        [layers] if isinstance(layers, str) else layers,
-        suffix=suffix,
-        options={name for name, value in options.items() if value is not None},
+        path, [layers] if isinstance(layers, str) else layers, write=write, results=results
     )
     _require_same_city(path, database, objects, evaluation)
-    if names == ["field"] and evaluation is not None:
-        export_field(error_field(evaluation, database, radius=smooth), database, path)
-        return
-    if suffix in _RASTER:
-        values, unit = _raster_values(names[0], database, identifiability, evaluation)
-        export_geotiff(database, values, path, name=names[0], unit=unit)
-        return
-    if suffix == _TILES:
-        write_pmtiles(database, path, identifiability=identifiability, progress=progress)
-        return
-    by_name: dict[str, Layer] = {}
-    if "cells" in names:
-        shape = geometry or ("point" if suffix == ".csv" else "polygon")
-        by_name["cells"] = cells_layer(database, identifiability=identifiability, geometry=shape)
-    if objects is not None:
-        by_name["objects"] = objects_layer(objects)
-    if evaluation is not None:
-        by_name |= {layer.name: layer for layer in evaluation_layers(evaluation, database)}
-    if h3 is not None:
-        by_name["hexagons"] = hexagons_layer(
-            database, h3, objects=objects, identifiability=identifiability, evaluation=evaluation
-        )
-    content = [by_name[name] for name in names]
-    if suffix == ".gpkg" and "evaluation" in names:
-        content[names.index("evaluation")], figures = split_figures(by_name["evaluation"])
-        content.append(figures)
-    if suffix in _MANY_LAYERS:
-        _MANY_LAYERS[suffix](content, path, progress=progress)
+    if write.cells is not None:
+        results.setdefault("geometry", write.cells)
+    results["database"] = database
+    content = []
+    for name in names:
+        used = used_results(kinds[name])
+        content.append(kinds[name](**{key: results[key] for key in used & results.keys()}))
+    if write.holds == "raster":
+        write(content[0], path)
+    elif write.holds == "layer":
+        write(content[0], path, progress=progress)
     else:
-        _ONE_LAYER[suffix](content[0], path, progress=progress)
-
-
-def _raster_values(
-    name: str,
-    database: SignatureDatabase,
-    identifiability: Identifiability | None,
-    evaluation: Evaluation | None,
-) -> tuple[NDArray[np.float64], str]:
-    """Return the values of the cells in a raster, and their unit."""
-    if name == "error" and evaluation is not None:
-        return cell_errors(evaluation, database), "m"
-    if name == "identifiability" and identifiability is not None:
-        return identifiability.found, ""
-    return database.type_group_sizes.astype(np.float64), "cells"
+        parts = [part for layer in content for part in layer.parts or (layer,)]
+        write(parts, path, progress=progress)
 
 
 def _require_same_city(
@@ -270,39 +192,42 @@ def _require_same_city(
 
 
 def _content(
-    path: str | Path, names: Sequence[str], *, suffix: str, options: set[str]
+    path: str | Path, names: Sequence[str], *, write: Writer, results: Mapping[str, object]
 ) -> list[str]:
     """Return the names of the layers or the raster to write.
 
-    Raise if a name is not accepted or lacks an option, or if nothing uses one of `options`.
+    Raise if a name is not accepted or lacks a result, or if nothing uses a result that is given.
     """
-    accepted = _CONTENT[suffix]
+    kinds: Registry[Callable[..., Any]] = RASTERS if write.holds == "raster" else LAYERS
+    accepted = write.layers or tuple(kinds)
     for name in names:
         if name not in accepted:
             hint = nearest_name(name, accepted)
             raise UnknownNameError(
                 f"{path} cannot contain {name!r}; give one of {', '.join(accepted)}{hint}."
             )
-    many = suffix in _MANY_LAYERS
+    many = write.holds == "layers"
     if len(names) > 1 and not many:
         raise InputError(
             f"{path} can contain only one layer, but {' and '.join(names)} were given; give one of "
             "them, or write a GeoPackage."
         )
-    possible = [name for name in accepted if _NEEDS.get(name) in {None, *options}]
-    # A resolution of hexagons makes them the default of a format of one layer.
-    default = [name for name in accepted if _NEEDS.get(name) == "resolution" and name in possible]
-    content = list(dict.fromkeys(names)) or (possible if many else [*default, accepted[0]][:1])
+    missing = {name: needed_results(kinds[name]) - results.keys() for name in accepted}
+    default = AMBIGUITY if write.holds == "raster" else CELLS
+    if "resolution" in results and HEXAGONS in accepted:
+        default = HEXAGONS
+    possible = [name for name in accepted if not missing[name]]
+    content = list(dict.fromkeys(names)) or (possible if many else [default])
     for name in content:
-        if name not in possible:
+        if missing[name]:
+            needed = " and ".join(sorted(missing[name]))
             raise InputError(
-                f"layer {name!r} was chosen for {path} with no {_NEEDS[name]}; give that as well."
+                f"layer {name!r} was chosen for {path} with no {needed}; give that as well."
             )
     # Identifiability is a property of the database, so it never counts as unused.
-    used = {"identifiability", *(_NEEDS[name] for name in content if name in _NEEDS)}
-    used.update(*(_USES.get(name, ()) for name in content))
-    used -= {"geometry"} if suffix == _TILES else set()
-    unused = sorted(options - used)
+    used = {"identifiability"}.union(*(used_results(kinds[name]) for name in content))
+    used -= {"geometry"} if write.cells is None else set()
+    unused = sorted(results.keys() - used)
     if unused:
         raise InputError(
             f"{path} contains only the {' and '.join(content)}, not the {' or '.join(unused)}; "
@@ -355,9 +280,9 @@ def export_item(
     >>> item["assets"]["database"]["href"], item["properties"]["proj:code"]
     ('city.parquet', 'EPSG:32631')
     """
-    _suffix(path, {ITEM})
+    _suffix(path, [ITEM])
     with extra("stac", "a STAC item"):
-        from semsig_gis.output.files.stac import write_item  # noqa: PLC0415 - pystac is an extra
+        from semsig_gis.output.stac import write_item  # noqa: PLC0415 - pystac is an extra
     city = open_city(database)
     if objects is not None:
         _require_same_city(path, city.database, open_objects(objects), None)
@@ -408,30 +333,34 @@ def export_answer(
     ...     export_answer(answer, demo_database, f"{folder}/regions.gpkg").to_dict()["cells"]
     5
     """
-    suffix = _suffix(path, [*dict.fromkeys((*_ANSWER, *_ONE_LAYER)), *sorted(_RASTER)])
-    if suffix in _RASTER and answer.chances is None:
+    suffix = _suffix(path, [f".{name}" for name in FORMATS if not FORMATS[name].layers])
+    write = FORMATS[suffix[1:]]
+    if write.holds == "raster" and answer.chances is None:
         raise InputError(
             f"{path} would contain the chance of every cell, which this method does not compute; "
             "use the likelihood method, or write a GeoPackage."
         )
     regions = search_regions(answer, database, share=share, within=within)
-    if suffix in _RASTER and answer.chances is not None:
+    if write.holds == "raster" and answer.chances is not None:
         values: Mapping[str, Any] = answer.to_dict()
         facts = {name: values[name] for name in RASTER_FACTS}
-        export_geotiff(database, answer.chances, path, name="posterior", facts=facts)
-    elif suffix in _ANSWER:
-        _ANSWER[suffix](answer_layers(answer, database, regions), path)
+        chances = cell_raster(database, "posterior", answer.chances, scale=CHANCES, facts=facts)
+        write(chances, path)
+        return regions
+    layers = answer_layers(answer, database, regions)
+    if write.write_answer is not None:
+        write.write_answer(layers, path)
     else:
-        _ONE_LAYER[suffix](answer_layers(answer, database, regions)[0], path)
+        write(layers[0] if write.holds == "layer" else layers, path)
     return regions
 
 
-def _suffix(path: str | Path, accepted: Collection[str]) -> str:
+def _suffix(path: str | Path, accepted: Sequence[str]) -> str:
     """Return the suffix of a file in lower case; raise if it is not accepted."""
     suffix = Path(path).suffix.lower()
+    suffix = ALIASES.get(suffix, suffix)
     if suffix not in accepted:
-        # The message lists one suffix for each format.
-        *names, last = [name for name in accepted if name != ".tiff"]
+        *names, last = accepted
         listed = f"{', '.join(names)} or {last}" if names else last
         raise InputError(
             f"{path} does not end in {listed}; give a name with one of these suffixes."

@@ -16,7 +16,6 @@ import numpy as np
 
 from semsig_gis.core import (
     FULL_TURN,
-    SHADES,
     VERDICTS,
     InputError,
     SemsigError,
@@ -161,7 +160,7 @@ class Workbench:
     def about(self) -> dict[str, Any]:
         """The facts about the city that the page shows first."""
         database = self.database
-        image, bounds = city_image(database, SHADES)
+        image, bounds = city_image(database)
         shares = self._shares
         signs = class_signs(database.taxonomy)
         ranges = database.taxonomy.ranges(database.spec.radius)

@@ -38,7 +38,6 @@ from semsig_gis.core import (
     ObjectClass,
     Taxonomy,
     class_signs,
-    group_labels,
 )
 from semsig_gis.output import (
     AMBIGUITY,
@@ -48,6 +47,7 @@ from semsig_gis.output import (
     OUTLINES,
     by_outcome,
     mark_svg,
+    renderer,
 )
 from semsig_gis.output.figures import axes, plots, scenes
 
@@ -225,7 +225,7 @@ def test_colours_of_reports_have_no_other_meaning() -> None:
 
 def test_web_and_qgis_use_the_same_colours() -> None:
     assert len({mark.shape for mark in OUTCOMES.values()}) == len(OUTCOMES)
-    root = ET.fromstring(by_outcome(geometry="point").renderer)  # noqa: S314 - our own
+    root = ET.fromstring(renderer(by_outcome(geometry="point"), "point"))  # noqa: S314 - our own
     for (outcome, mark), category in zip(OUTCOMES.items(), root.iter("category"), strict=True):
         assert (category.get("value"), category.get("label")) == (outcome, outcome)
         symbol = root.find(f".//symbol[@name='{category.get('symbol')}']")
@@ -235,8 +235,10 @@ def test_web_and_qgis_use_the_same_colours() -> None:
         assert options["color"] == f"{red},{green},{blue},255"
         assert options["name"] == CLASS_MARKERS[mark.shape][0]
         assert f'd="{OUTLINES[mark.shape]}" fill="{mark.colour}"' in mark_svg(mark)
-    assert [*AMBIGUITY.values()] == [*zip(group_labels(), GROUP_COLOURS.values(), strict=True)]
-    assert [colour for _, colour in IDENTIFIABILITY.values()] == list(FOUND_RAMP)
+    labels = ("no other", "2 to 9", "10 to 99", "100 to 999", "1,000 to 9,999", "10,000 or more")
+    assert AMBIGUITY.labels == labels
+    assert AMBIGUITY.colours == tuple(GROUP_COLOURS.values())
+    assert IDENTIFIABILITY.colours == FOUND_RAMP
 
 
 # --- Signs of classes ---------------------------------------------------------------------------

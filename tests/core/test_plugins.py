@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import re
@@ -30,7 +29,7 @@ from semsig_gis.core import (
 from semsig_gis.objects import open_objects
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
 
 @pytest.fixture(scope="module")
@@ -121,27 +120,6 @@ def test_installed_command_is_listed_and_runs_and_is_imported_only_then(
 
 
 # --- Entries without a package around them ----------------------------------------------------
-
-
-@pytest.fixture
-def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
-    """Return what puts a distribution on the path, with one module, as an installer leaves it."""
-    site, modules = tmp_path / "site", []
-    monkeypatch.syspath_prepend(site)
-
-    def install(package: str, group: str, code: str, **entries: str) -> None:
-        info = site / f"{package}-1.0.dist-info"
-        info.mkdir(parents=True)
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-        modules.append(f"a_module_of_{package}")
-        lines = [f"[{group}]", *(f"{name} = {modules[-1]}:{it}" for name, it in entries.items())]
-        (info / "entry_points.txt").write_text("\n".join(lines), encoding="utf-8")
-        (site / f"{modules[-1]}.py").write_text(code, encoding="utf-8")
-        importlib.invalidate_caches()
-
-    yield install
-    for module in modules:  # another test may have a module of that name
-        sys.modules.pop(module, None)
 
 
 def test_names_are_sorted_and_values_are_paths(

@@ -94,7 +94,7 @@ def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
     data = {f"semsig_gis/{path.relative_to(ROOT)}" for path in files}
     suffixes = {".css", ".html", ".js", ".py", ".qgs", ".qml", ".xml"}
     code = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*") if path.suffix in suffixes}
-    others = {"py.typed", "assets/manifest.toml", "output/qgis/shown.toml"}
+    others = {"py.typed", "assets/manifest.toml"}
     assert data | code | {f"semsig_gis/{name}" for name in others} <= wheel.keys()
     if page.available():
         assert {f"semsig_gis/assets/{name}" for name in page.assets()} <= wheel.keys()

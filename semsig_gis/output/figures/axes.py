@@ -6,26 +6,21 @@ plotted into the same axes.
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
 from semsig_gis.core import (
     ANSWERS,
     CANDIDATE_RAMP,
-    CELL_CHANCES,
-    FOUND_RAMP,
-    GROUP_COLOURS,
     OUTCOMES,
-    SHADES,
     WHITE,
     EmptyResultError,
     InputError,
     UnknownNameError,
     class_signs,
     extra,
-    group_labels,
     nearest_name,
     percent,
 )
@@ -34,6 +29,7 @@ from semsig_gis.localization import Location
 from semsig_gis.output.figures.plots import INK, cell_pixels, draw_curve, draw_frame, label
 from semsig_gis.output.figures.scenes import MARKERS
 from semsig_gis.output.figures.shares import curve_of, plot_of
+from semsig_gis.output.layers.styles import AMBIGUITY, CHANCES, IDENTIFIABILITY, SEEN
 
 with extra("plot", "a report or a figure"):
     from matplotlib.colors import LinearSegmentedColormap, ListedColormap
@@ -43,7 +39,7 @@ with extra("plot", "a report or a figure"):
     from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
@@ -57,6 +53,7 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import Evaluation, Identifiability
     from semsig_gis.localization import Answer
     from semsig_gis.objects import StreetObjects
+    from semsig_gis.output.layers.styles import Scale
 
 SIZE = (7.5, 6.0)  # inches of a new figure
 MOST_PIXELS = 4000  # of an image along a side
@@ -64,26 +61,12 @@ KILOMETRE = 1000
 LONGEST_LABEL = 40
 
 
-class ColourSteps(NamedTuple):
-    """The title of a number of cells, and the colour of each range by its lower bound."""
-
-    title: str
-    colours: Mapping[int, str] | Mapping[float, str]
-    labels: Sequence[str]
-
-
-_SHADES = [*(f"{low} to {high - 1}" for low, high in pairwise(SHADES)), f"{max(SHADES)} or more"]
 # Columns of the cells, with their names in files.
-CELL_COLUMNS: Mapping[str, ColourSteps] = {
-    "length": ColourSteps("objects seen", SHADES, _SHADES),
-    "type_group_size": ColourSteps("cells with the same types", GROUP_COLOURS, group_labels()),
-    "angle_group_size": ColourSteps(
-        "cells with the same angle levels", GROUP_COLOURS, group_labels()
-    ),
+CELL_COLUMNS: Mapping[str, Scale] = {
+    "length": SEEN,
+    "type_group_size": AMBIGUITY,
+    "angle_group_size": replace(AMBIGUITY, title="cells with the same angle levels"),
 }
-CHANCE_STEPS = ColourSteps(
-    "chance of a cell", CELL_CHANCES, [f"{100 * chance:g} % or more" for chance in CELL_CHANCES]
-)
 COLOUR_OPTIONS = {"cmap", "norm", "vmin", "vmax"}
 
 
@@ -188,7 +171,7 @@ def plot_identifiability(
     >>> ax.get_title()
     'Chance to be found within 50 m'
     """
-    cmap = LinearSegmentedColormap.from_list("found", FOUND_RAMP)
+    cmap = LinearSegmentedColormap.from_list("found", IDENTIFIABILITY.colours)
     database, chances = identifiability.database, identifiability.found
     axes = plot_database(database, chances, ax=ax, legend=legend, cmap=cmap, vmin=0, vmax=1)
     axes.set_title(f"Chance to be found within {identifiability.radius:g} m")
@@ -396,12 +379,11 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     database, place = location.posterior.database, location.estimate
     axes = map_axes(ax)
     _draw_cells(axes, database, np.ones(len(database)), cmap=ListedColormap([CELL_GROUND]))
-    chances = np.where(location.chances >= min(CELL_CHANCES), location.chances, np.nan)
-    _draw_steps(axes, database, chances, CHANCE_STEPS, legend=legend)
+    chances = np.where(CHANCES.levels(location.chances), location.chances, np.nan)
+    _draw_steps(axes, database, chances, CHANCES, legend=legend)
     # Dots make single cells visible at small scales; the most probable are drawn last, on top.
     cells = location.region[~np.isnan(chances[location.region])][::-1]
-    levels = np.digitize(chances[cells], [*CELL_CHANCES]) - 1
-    colours = np.array([*CELL_CHANCES.values()])[levels]
+    colours = np.array(CHANCES.colours)[CHANCES.levels(chances[cells]) - 1]
     x, y = database.xy[cells].T
     axes.scatter(x, y, c=colours, s=DOT, linewidths=0, marker="s", zorder=2)
     mark = ANSWERS["given" if location.answer.given else "withheld"]
@@ -438,19 +420,19 @@ def _draw_steps(
     axes: Axes,
     database: SignatureDatabase,
     values: NDArray[np.float64],
-    steps: ColourSteps,
+    scale: Scale,
     *,
     legend: bool,
     **look: Any,  # noqa: ANN401 - whatever matplotlib takes
 ) -> None:
     """Draw numbers of cells in the colours of their ranges."""
-    levels = np.where(np.isnan(values), np.nan, np.digitize(values, [*steps.colours]) - 1.0)
-    ends = {"vmin": -0.5, "vmax": len(steps.colours) - 0.5}
-    scale = {"cmap": ListedColormap([*steps.colours.values()]), **ends}
-    image = _draw_cells(axes, database, levels, **scale, **look)
+    levels = np.where(np.isnan(values), np.nan, scale.levels(values) - 1.0)
+    ends = {"vmin": -0.5, "vmax": len(scale.colours) - 0.5}
+    colours = {"cmap": ListedColormap(scale.colours), **ends}
+    image = _draw_cells(axes, database, levels, **colours, **look)
     if legend:
-        bar = _add_colour_bar(axes, image, steps.title)
-        bar.set_ticks(range(len(steps.labels)), labels=steps.labels)
+        bar = _add_colour_bar(axes, image, scale.title)
+        bar.set_ticks(range(len(scale.labels)), labels=scale.labels)
         bar.ax.tick_params(length=0)
 
 

@@ -12,8 +12,8 @@ import pyogrio
 import shapely
 
 from semsig_gis.core import ANSWERS, GEOMETRY, one_line
-from semsig_gis.output.files.tables import geojson_options, write_errors
-from semsig_gis.output.styles import RANKS
+from semsig_gis.output.features import geojson_options, write_errors
+from semsig_gis.output.layers.styles import RANKS
 from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def write_answer_kml(layers: Sequence[Layer], path: str | Path) -> None:
     _add_text(document, "name", TITLE)
     _add_text(document, "description", "\n".join(map(one_line, layers[0].licenses)))
     marks = (mark.colour for mark in ANSWERS.values())
-    for colour in [*(colour for _, colour in RANKS.values()), *marks]:
+    for colour in [*RANKS.colours, *marks]:
         _add_style(document, colour)
     tables = [layer.read(slice(0, layer.rows)).to_pandas() for layer in layers]
     # All schemas precede the folders that use them. The integers of KML are too short for the ids
@@ -118,10 +118,8 @@ def _add_place(
     _add_text(place, "name", name)
     # The first column is the answer's verdict or a rank, and decides the colour.
     key = str(next(iter(row.values())))
-    if key in ANSWERS:
-        colour = ANSWERS[key].colour
-    else:
-        colour = next(colour for (_, high), (_, colour) in RANKS.items() if float(key) <= high)
+    ranked = key not in ANSWERS
+    colour = RANKS.colours[RANKS.levels(float(key)) - 1] if ranked else ANSWERS[key].colour
     _add_text(place, "styleUrl", f"#c{colour[1:]}")
     data = ET.SubElement(ET.SubElement(place, "ExtendedData"), "SchemaData", schemaUrl=f"#{layer}")
     for column, value in row.items():

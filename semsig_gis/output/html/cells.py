@@ -12,13 +12,10 @@ from folium.template import Template
 
 from semsig_gis.core import (
     BEARING_UNITS,
-    FOUND_RAMP,
     FULL_TURN,
-    GROUP_COLOURS,
     SAME_LEVELS,
     SAME_TYPES,
     InputError,
-    group_labels,
     percent,
 )
 from semsig_gis.output.html.image import (
@@ -51,6 +48,7 @@ from semsig_gis.output.html.page_elements import (
     swatch,
     unique_layer_name,
 )
+from semsig_gis.output.layers.styles import AMBIGUITY, IDENTIFIABILITY
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -261,8 +259,7 @@ def ambiguity_map(
     sizes = {"Same types": database.type_group_sizes, "Same types and angle levels": counts[pair]}
     pixels = CellPixels.of(database)
     for name, size in sizes.items():
-        levels = pixels.levels(np.digitize(size, list(GROUP_COLOURS)).astype(np.uint8))
-        image = pixels.image(levels, list(GROUP_COLOURS.values()))
+        image = pixels.image(pixels.levels(AMBIGUITY.levels(size)), AMBIGUITY.colours)
         show = name == "Same types"
         colour_cells(page, name, cell_image(page, *image, dark="lift"), show=show)
     more = [] if identifiability is None else [_lookalike_facts(identifiability)]
@@ -301,9 +298,8 @@ def identifiability_map(
     database = identifiability.database
     view = city_view(database)
     page = start_map(map_, tiles, title="Where a query can be placed")
-    steps = len(FOUND_RAMP)
-    levels = np.minimum(np.floor(identifiability.found * steps), steps - 1).astype(np.uint8)
-    image = level_image(database, levels + np.uint8(1), FOUND_RAMP)
+    levels = IDENTIFIABILITY.levels(identifiability.found)
+    image = level_image(database, levels, IDENTIFIABILITY.colours)
     colour_cells(page, "Chance to be found", cell_image(page, *image, dark="lift"))
     add_cells(page, database, [_group_facts(database), _lookalike_facts(identifiability)])
     legend = identifiability_legend(identifiability)
@@ -357,22 +353,18 @@ def _chance_bytes(chances: NDArray[np.float64]) -> list[str]:
 
 def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequence[str]) -> str:
     """Return the legend of `ambiguity_map` as HTML; `sizes` holds group sizes by layer name."""
-    starts = list(GROUP_COLOURS)
-    shares = [
-        np.bincount(np.digitize(size, starts), minlength=len(starts) + 1)[1:] / len(size)
-        for size in sizes.values()
-    ]
     scales = []
-    for (name, size), line in zip(sizes.items(), shares, strict=True):
+    for name, size in sizes.items():
+        shares = np.bincount(AMBIGUITY.levels(size), minlength=len(AMBIGUITY.labels) + 1) / len(
+            size
+        )
         rows = "".join(
             f"<tr><td>{swatch(colour, LIFTING)}{label}</td>"
             f"<td class='count'>{percent(share, 1)}</td></tr>"
-            for colour, label, share in zip(
-                GROUP_COLOURS.values(), group_labels(), line, strict=True
-            )
+            for (_, _, label, colour), share in zip(AMBIGUITY.ranges, shares[1:], strict=True)
         )
         scale = (
-            f"<p><b>{percent(line[0], 1)}</b> of {len(size):,} cells look like no other<br>"
+            f"<p><b>{percent(shares[1], 1)}</b> of {len(size):,} cells look like no other<br>"
             f"How many cells have the {escape(name.lower())}</p><table>{rows}</table>"
         )
         scales.append(layer_part(name, scale))
@@ -399,9 +391,8 @@ def identifiability_legend(identifiability: Identifiability) -> str:
         f"<td>{100 * item['chance_near']:+.1f} %</td></tr>"
         for item in facts["classes"][:NAMED_CLASSES]
     )
-    scale = (
-        f"<p>Chance to be found{ramp_bar(FOUND_RAMP, '0 %', '100 %', sign='ramp semsig-lift')}</p>"
-    )
+    bar = ramp_bar(IDENTIFIABILITY.colours, "0 %", "100 %", sign="ramp semsig-lift")
+    scale = f"<p>Chance to be found{bar}</p>"
     figures = (
         f"<p>{bands}</p><p>What each class adds to the chance {within}</p><table>{classes}</table>"
     )

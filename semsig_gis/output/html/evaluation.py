@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core import ERROR_BREAKS, FAILURES, OUTCOMES, percent
+from semsig_gis.core import ERROR_BREAKS, OUTCOMES, percent
 from semsig_gis.evaluation import ENOUGH_QUERIES, Evaluation, chain_text, error_field
 from semsig_gis.observation import parse_view
 from semsig_gis.output.html.image import mercator_places, packed
@@ -42,6 +42,7 @@ from semsig_gis.output.html.page_elements import (
     ties_text,
     to_latlon,
 )
+from semsig_gis.output.layers.styles import FAILED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -288,8 +289,8 @@ def _packed_field(
         "box": box,
         "width": width,
         "height": height,
-        "breaks": [1.0 + SHARE_STEPS * least if least else 0.0 for least in FAILURES],
-        "colours": list(FAILURES.values()),
+        "breaks": [1.0 + SHARE_STEPS * low if low else 0.0 for low in FAILED.breaks[:-1]],
+        "colours": FAILED.colours,
         "enough": WEIGHT_STEPS * ENOUGH_QUERIES,
     }
     return arrays, about
@@ -304,7 +305,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
         f"<tr><td>P(error ≤ {threshold} m)</td><td>{percent(share, 1)}</td></tr>"
         for threshold, share in zip(ERROR_BREAKS, evaluation.cdf(ERROR_BREAKS), strict=True)
     )
-    limits = [f"{percent(least, 0)}" for least in FAILURES if least]
+    limits = [percent(low, 0) for low in FAILED.breaks[1:-1]]
     within = f"within {Evaluation.success_metres} m"
     successful = (
         f"{mark_svg(OUTCOMES['successful'])} {successes:,} successful: {within} with probability "
@@ -313,7 +314,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     failed = f"{mark_svg(OUTCOMES['failed'])} {count - successes:,} failed"
     field = (
         f"<p>Share of the queries within {radius:,g} m that failed, the nearer counting more"
-        f"{class_bar(list(FAILURES.values()), limits)}"
+        f"{class_bar(FAILED.colours, limits)}"
         f'<i class="hatched"></i>fewer than {ENOUGH_QUERIES:g} queries count</p>'
     )
     share = percent(evaluation.cdf([Evaluation.success_metres])[0], 1)

@@ -15,9 +15,10 @@ import numpy as np
 from pyproj import CRS, Transformer
 
 from semsig_gis.core import across_180, cell_ids, to_degrees
+from semsig_gis.output.layers.styles import SEEN
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -117,17 +118,14 @@ class CellPixels:
         return values
 
 
-def city_image(
-    database: SignatureDatabase, shades: Mapping[int, str]
-) -> tuple[bytes, list[list[float]]]:
+def city_image(database: SignatureDatabase) -> tuple[bytes, list[list[float]]]:
     """Return a PNG of the number of objects seen from each cell, and its corners.
 
-    ``shades`` gives the colour (``#rrggbb``) of each smallest number of objects, rising from 1. A
-    block of several cells gets their mean (see `CellPixels`).
+    A block of several cells gets their mean (see `CellPixels`).
     """
     pixels = CellPixels.of(database)
     means = np.bincount(pixels.members, weights=database.lengths) / np.bincount(pixels.members)
-    return pixels.image(np.digitize(means, list(shades)).astype(np.uint8), list(shades.values()))
+    return pixels.image(SEEN.levels(means), SEEN.colours)
 
 
 def level_image(

@@ -21,7 +21,6 @@ from folium.utilities import JsCode
 from semsig_gis import __version__
 from semsig_gis.core import (
     FULL_TURN,
-    SHADES,
     VERDICTS,
     InputError,
     across_180,
@@ -32,6 +31,7 @@ from semsig_gis.core import (
 from semsig_gis.database import SignatureDatabase
 from semsig_gis.observation import View
 from semsig_gis.output.html.image import city_image, script_json
+from semsig_gis.output.layers.styles import SEEN
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -420,7 +420,7 @@ def add_city(map_: folium.Map, database: SignatureDatabase, *, show: bool = True
 
     It is shown unless the cells are coloured by another layer.
     """
-    picture = city_image(database, SHADES)
+    picture = city_image(database)
     for child in layers_of(map_).values():
         if isinstance(child, ImageOverlay) and child.url == data_url(picture[0]):
             return child
@@ -568,11 +568,9 @@ def class_bar(colours: Sequence[str], breaks: Sequence[str]) -> str:
 
 def shades_part() -> str:
     """Return the legend of the image that `add_city` adds."""
-    labels = [f"{low}-{high - 1}" for low, high in itertools.pairwise(SHADES)]
-    labels.append(f"{max(SHADES)}+")
-    signs = " &ensp;".join(
-        f"{swatch(colour, FLIPPING)}{label}"
-        for colour, label in zip(SHADES.values(), labels, strict=True)
+    signs = " ".join(
+        f"<span style='white-space:nowrap'>{swatch(colour, FLIPPING)}{label}</span>"
+        for _, _, label, colour in SEEN.ranges
     )
     name = "Objects seen from a cell"
     return layer_part(name, f"<p>{name}<br>{signs}</p>")

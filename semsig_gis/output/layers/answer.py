@@ -10,11 +10,9 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.database import CellTable
-from semsig_gis.output.layers.model import Layer, table_layer
-from semsig_gis.output.styles import (
-    by_answer,
-    by_rank,
-)
+from semsig_gis.output.layers.columns import form_of
+from semsig_gis.output.layers.model import Display, table_layer
+from semsig_gis.output.layers.styles import by_answer, by_rank
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,6 +20,66 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization import Answer, SearchRegions
     from semsig_gis.output.layers.model import Layer
+
+PLACE_FORM = form_of("""
+[Place]
+answer = ["Answer", "Given, or withheld where the chance is too small."]
+chance = ["Chance", "Of the place being right, from 0 to 1.", "1", 2]
+elsewhere = ["Chance of elsewhere", "Of the view not being from the area of the cells, from 0 to 1.", "1", 2]
+fit = ["Fit", "Share of simulated views from the place that fit it worse, from 0 to 1; below 0.01, the query fits badly.", "1", 3]
+within_m = ["Right within", "How near a right place is.", "m", 0]
+x = ["East", "In the coordinate system of the layer.", "m", 2]
+y = ["North", "In the coordinate system of the layer.", "m", 2]
+lon = ["Longitude", "WGS 84.", "°", 7]
+lat = ["Latitude", "WGS 84.", "°", 7]
+sigma = ["Standard deviation", "Of the place in either direction, if it is right.", "m", 1]
+heading = ["Heading", "What is added to the bearings of the query to have them from north.", "°", 1]
+heading_sigma = ["Standard deviation of the heading", "Of the heading.", "°", 1]
+cell_id = ["Cell", "Number of the cell in the grid."]
+refined = ["Off the grid", "Whether the place was looked for between the viewpoints, too."]
+""")  # noqa: E501
+CANDIDATE_FORM = form_of("""
+[Place]
+rank = ["Rank", "1 is the best place for the query."]
+rank_low = ["Rank from", "First rank that ties allow; 1 is the best."]
+rank_high = ["Rank to", "Last rank that ties allow."]
+tied = ["Tied cells", "How many cells are as good."]
+chance = ["Chance", "Of the view being from this place, from 0 to 1.", "1", 2]
+cell_chance = ["Chance of the cell", "Of the view being from its likeliest cell, from 0 to 1.", "1", 4]
+distance = ["Distance of signatures", "Between the query and what is seen from the cell; 0 is equal.", "", 4]
+loglik = ["Log-likelihood", "Of the query, were it seen from the cell; the higher the better.", "", 2]
+heading = ["Heading", "What is added to the bearings of the query to have them from north.", "°", 1]
+cell_id = ["Cell", "Number of the cell in the grid."]
+cell = ["Row", "Number of the row in the database, from 0."]
+x = ["Viewpoint, east", "In the coordinate system of the layer.", "m", 2]
+y = ["Viewpoint, north", "In the coordinate system of the layer.", "m", 2]
+["What is seen"]
+length = ["Objects seen", "How many street objects are seen from the cell."]
+types = ["Types", "Symbols of the objects, clockwise from north."]
+bearings = ["Bearings", "Of the same objects, clockwise from grid north.", "°"]
+distances = ["Distances", "Of the same objects.", "m"]
+""")  # noqa: E501
+REGION_FORM = form_of("""
+[Region]
+rank = ["Rank", "1 is the region to be searched first."]
+chance = ["Chance", "Of the place being in the region, if it is in the city, from 0 to 1.", "1", 2]
+cells = ["Cells", "How many cells the region has."]
+km2 = ["Area", "Of all its cells.", "km²", 4]
+best_cell_id = ["Best cell", "Number of its best cell in the grid."]
+best_x = ["Best cell, east", "In the coordinate system of the layer.", "m", 2]
+best_y = ["Best cell, north", "In the coordinate system of the layer.", "m", 2]
+["Searched up to here"]
+searched_chance = ["Chance up to here", "Of the place being in this region or an earlier one, if it is in the city.", "1", 2]
+searched_km2 = ["Area up to here", "Of this region and all before it.", "km²", 4]
+searched_percent = ["Share of the city up to here", "Of the area of all cells.", "%", 3]
+""")  # noqa: E501
+
+GROUP = "Answer"
+# A candidate of the likelihood method has one rank, others may be tied.
+RANK = "coalesce(attribute('rank'), attribute('rank_low'))"
+CANDIDATE_LABEL = (
+    f"with_variable('rank', {RANK}, case when @rank <= 10 or @map_scale < 5000 then @rank end)"
+)
 
 
 def answer_layers(
@@ -50,6 +108,13 @@ def answer_layers(
             title="Regions to search",
             description="Where the query may have been seen from, the best first.",
             geometry="polygon",
+            form=REGION_FORM,
+            display=Display(
+                level=6,
+                group=GROUP,
+                name="""'region ' || "rank" """,
+                tip=("chance", "km2", "searched_percent"),
+            ),
             styles=(by_rank("rank", geometry="polygon"),),
         ),
         layer(
@@ -58,6 +123,15 @@ def answer_layers(
             title="Candidates",
             description="The best places or cells for the query.",
             geometry="point",
+            form=CANDIDATE_FORM,
+            display=Display(
+                level=7,
+                group=GROUP,
+                name=f"'candidate ' || {RANK}",
+                signature=("types", "bearings", "distances", " "),
+                tip=("chance", "distance"),
+                label=CANDIDATE_LABEL,
+            ),
             styles=(by_rank(str(answer.candidates.columns[0]), geometry="point"),),
         ),
     ]
@@ -73,6 +147,13 @@ def answer_layers(
         title="Place",
         description="Where the query was most probably seen from, and how sure that is.",
         geometry="point",
+        form=PLACE_FORM,
+        display=Display(
+            level=8,
+            group=GROUP,
+            name="""'place, answer ' || "answer" """,
+            tip=("chance", "elsewhere", "sigma"),
+        ),
         styles=(by_answer(),),
     )
     return [*layers, estimate]

@@ -1,4 +1,4 @@
-"""Statistics of cells by area, and the layer of H3 hexagons with them."""
+"""The layer of H3 hexagons, with statistics of the cells in each."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from pyproj import Transformer
 
 from semsig_gis.core import InputError
 from semsig_gis.database import database_specs
-from semsig_gis.output.layers.model import group_means, table_layer
-from semsig_gis.output.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
+from semsig_gis.output.layers import LAYERS
+from semsig_gis.output.layers.cells import area_statistics
+from semsig_gis.output.layers.columns import form_of
+from semsig_gis.output.layers.model import Display, group_means, table_layer
+from semsig_gis.output.layers.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,8 +28,29 @@ if TYPE_CHECKING:
 
 
 FINEST = 15
+FORM = form_of("""
+[Hexagon]
+h3 = ["Hexagon", "Its index of H3."]
+cells = ["Cells", "How many cells it has."]
+objects = ["Street objects", "How many street objects it has."]
+mean_length = ["Objects seen", "From its mean cell.", "", 1]
+type_group_size = ["Cells with the same types", "For the median cell; 1: no other cell.", "", 0]
+ambiguous = ["Share that look like another", "Of its cells, by types, from 0 to 1.", "1", 3]
+chance_found = ["Chance to be found", "For a query from its mean cell, from 0 to 1.", "1", 3]
+queries = ["Queries", "How many queries of the evaluation are from it."]
+found = ["Share found", "Of these queries, from 0 to 1.", "1", 3]
+""")
+DISPLAY = Display(
+    level=2,
+    group="City",
+    name="""'hexagon ' || "h3" """,
+    tip=("cells", "objects", "chance_found", "found"),
+    farther=25000,
+    covers="cells",
+)
 
 
+@LAYERS.register
 def hexagons_layer(
     database: SignatureDatabase,
     resolution: int,
@@ -85,34 +109,7 @@ def hexagons_layer(
         geometry="polygon",
         licenses=database.licenses,
         facts={**database_specs(database), "h3_resolution": resolution},
-        styles=tuple(by_amount(*style, geometry="polygon", size=0.0) for style in styles),
+        form=FORM,
+        display=DISPLAY,
+        styles=tuple(by_amount(*style, geometry="polygon") for style in styles),
     )
-
-
-def area_statistics(
-    database: SignatureDatabase,
-    areas: NDArray[np.int64],
-    count: int,
-    *,
-    identifiability: Identifiability | None = None,
-) -> dict[str, NDArray[Any]]:
-    """Return statistics of the cells in each area; `areas` has the area number of each cell.
-
-    ``cells`` is their number, ``mean_length`` the mean number of objects that they see,
-    ``ambiguous`` the share of cells with the types of another cell, ``type_group_size`` the median,
-    and ``chance_found`` the mean chance to be found. NaN in an area without cells.
-    """
-    cells, sizes = np.bincount(areas, minlength=count), database.type_group_sizes
-    # Lower median: the middle row of each area, with the rows sorted by area and size.
-    ordered = sizes[np.lexsort((sizes, areas))]
-    middles = np.cumsum(cells) - cells + (cells - 1) // 2
-    medians = np.where(cells > 0, ordered[np.minimum(middles, len(ordered) - 1)], np.nan)
-    columns = {
-        "cells": cells,
-        "mean_length": group_means(areas, database.lengths, count),
-        "ambiguous": group_means(areas, sizes > 1, count),
-        "type_group_size": medians,
-    }
-    if identifiability is not None:
-        columns["chance_found"] = group_means(areas, identifiability.found, count)
-    return columns

@@ -18,15 +18,36 @@ from semsig_gis.core import (
     SOURCE_ID,
 )
 from semsig_gis.objects import objects_specs
-from semsig_gis.output.layers.model import Layer
-from semsig_gis.output.styles import (
-    by_class,
-)
+from semsig_gis.output.layers import LAYERS
+from semsig_gis.output.layers.columns import form_of
+from semsig_gis.output.layers.model import Display, Layer
+from semsig_gis.output.layers.styles import by_class
 
 if TYPE_CHECKING:
     from semsig_gis.objects import StreetObjects
 
+FORM = form_of("""
+[Object]
+title = ["Class", "What it is."]
+symbol = ["Symbol", "Letter of its class."]
+count = ["Objects", "How many objects of the source it stands for."]
+class_code = ["Class number", "Number of its class; a new object needs only this."]
+class_name = ["Class identifier", "Name of its class in catalogues."]
+[Source]
+source = ["Source", "Layer that it is from."]
+source_id = ["Number at the source", "What the source calls it."]
+merged = ["Also listed as", "The same object in other sources."]
+""")
+DISPLAY = Display(
+    level=1,
+    group="City",
+    name="""coalesce("title", "class_name") || coalesce(' ' || "source_id", '')""",
+    tip=("source", "count"),
+    nearer=6000,
+)
 
+
+@LAYERS.register
 def objects_layer(objects: StreetObjects) -> Layer:
     """Return the layer of the street objects."""
     classes = {item.code: item for item in objects.taxonomy.classes}
@@ -58,6 +79,8 @@ def objects_layer(objects: StreetObjects) -> Layer:
         read=read,
         licenses=tuple(map(str, objects.licenses)),
         facts={**objects_specs(objects), "crs": objects.crs.to_json_dict()},
+        form=FORM,
+        display=DISPLAY,
         styles=(by_class(objects.taxonomy, objects.class_counts),),
         taxonomy=objects.taxonomy,
     )

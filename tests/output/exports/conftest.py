@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from semsig_gis.output import layers
+from semsig_gis.output.layers import model
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -15,5 +15,5 @@ if TYPE_CHECKING:
 @pytest.fixture(autouse=True, scope="module")
 def _several_blocks() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(layers, "ROWS_A_BLOCK", 100)
+        patch.setattr(model, "ROWS_A_BLOCK", 100)
         yield

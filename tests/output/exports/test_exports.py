@@ -37,37 +37,18 @@ OF_OBJECTS: dict[str, Any] = {"objects": OBJECTS}
 OF_QUERIES: dict[str, Any] = {"evaluation": small_evaluation()}
 TABLES = (".gpkg", ".parquet", ".fgb", ".geojson", ".csv")
 ALL = (*TABLES, ".pmtiles", ".tif")
-GIVEN: dict[str, dict[str, Any]] = {
-    "cells": {},
-    "objects": OF_OBJECTS,
-    "evaluation": OF_QUERIES,
-    "evaluation_lines": OF_QUERIES,
-    "hexagons": {"h3": 11},
-}
 
 
 def test_geopackage_contains_all_or_the_chosen_layers(tmp_path: Path) -> None:
     everything = {**OF_OBJECTS, **OF_QUERIES, "identifiability": CHANCES, "h3": 9}
     export_database(CITY, tmp_path / "CITY.GPKG", geometry="point", **everything)
     layers = dict(pyogrio.list_layers(tmp_path / "CITY.GPKG").tolist())
-    assert [layers[name] for name in LAYERS] == [*["Point"] * 3, "LineString", "Polygon"]
+    assert [layers[name] for name in LAYERS] == ["Point", "Point", "LineString", "Polygon", "Point"]
     assert layers["evaluation_figures"] is None
     file, names = tmp_path / "queries.gpkg", ["evaluation", "evaluation_lines"]
     export_database(CITY, file, layers=names, **OF_QUERIES)
     names += ["evaluation_figures", "layer_styles"]
     assert pyogrio.list_layers(file)[:, 0].tolist() == names
-
-
-@pytest.mark.parametrize("layer", LAYERS)
-def test_other_formats_contain_one_layer(layer: str, tmp_path: Path) -> None:
-    for suffix in TABLES:
-        export_database(CITY, tmp_path / f"a{suffix}", layers=[layer], **GIVEN[layer])
-    expected = gpd.read_file(tmp_path / "a.gpkg", layer=layer)
-    readers = {".csv": pd.read_csv, ".parquet": gpd.read_parquet}
-    for suffix in TABLES[1:]:
-        table = readers.get(suffix, gpd.read_file)(tmp_path / f"a{suffix}")
-        assert set(expected.columns) - {"geometry"} <= set(table.columns)
-        assert len(table) == len(expected) > 10
 
 
 LOCATION = small_location()
@@ -114,12 +95,12 @@ def answer(result: Location | Localization, share: float = 0.9) -> Callable[[Pat
 MADE_WITH = "give the database that it was made with"
 PLACES = OBJECTS.table
 REFUSALS: list[tuple[Callable[[Path], object], str, tuple[str, ...]]] = [
-    (city(), "city.shp", ("city.shp", ".gpkg, .parquet, .fgb, .geojson, .csv, .pmtiles or .tif")),
+    (city(), "city.shp", ("city.shp", ".csv, .fgb, .geojson, .gpkg, .parquet, .pmtiles or .tif")),
     (city(), "city", ("does not end in",)),
     (city(layers=["cell"]), "city.gpkg", ("'cell'", "the nearest is 'cells'")),
     (city(layers=["cells", "objects"]), "city.gpkg", ("no objects",)),
     (city(layers=["cells"], **OF_OBJECTS), "city.gpkg", ("only the cells", "not the objects")),
-    (city(layers=LAYERS[:2], **OF_OBJECTS), "city.csv", ("one layer", "GeoPackage")),
+    (city(layers=["cells", "objects"], **OF_OBJECTS), "city.csv", ("one layer", "GeoPackage")),
     (city(h3=16), "city.fgb", ("resolution 16", "0 to 15")),
     (city(layers="hexagons"), "city.fgb", ("no resolution",)),
     (city(layers="cells", h3=9), "city.fgb", ("only the cells", "not the resolution")),

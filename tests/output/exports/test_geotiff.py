@@ -20,9 +20,10 @@ from semsig_gis.core import ERROR_BREAKS, FAILURES, GridSpec, InputError
 from semsig_gis.evaluation import error_field
 from semsig_gis.output import (
     AMBIGUITY,
-    CLEAR,
+    CHANCES,
     ERRORS,
-    STYLES,
+    FAILED,
+    IDENTIFIABILITY,
     by_pixel,
     cell_errors,
     export_answer,
@@ -33,6 +34,15 @@ from semsig_gis.storage import raster
 
 if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
+
+
+SCALES = {
+    "ambiguity": AMBIGUITY,
+    "identifiability": IDENTIFIABILITY,
+    "error": ERRORS,
+    "field": FAILED,
+    "posterior": CHANCES,
+}
 
 
 def assert_holds(file: Path, database: SignatureDatabase, values: np.ndarray) -> None:
@@ -116,24 +126,26 @@ def test_qgis_draws_rasters_as_the_maps_do(
     field = tmp_path / "field.tif"
     export_database(database, field, layers="field", evaluation=evaluation, smooth=60.0)
     export_answer(small_location(), database, tmp_path / "posterior.tif")
-    program = Path(__file__).parents[1] / "qgis_programs.py"
+    program = Path(__file__).parents[2] / "qgis_programs.py"
     result = subprocess.run(
-        [qgis_python, program, "pixels", *(tmp_path / f"{name}.tif" for name in STYLES)],
+        [qgis_python, program, "pixels", *(tmp_path / f"{name}.tif" for name in SCALES)],
         check=True, capture_output=True, timeout=PATIENCE_S, env=qgis_environment,
     )  # fmt: skip
     drawings = map(json.loads, result.stdout.splitlines())
-    for (name, classes), drawing in zip(STYLES.items(), drawings, strict=True):
-        assert drawing["labels"] == [label for label, _ in classes.values()]
+    for (name, scale), drawing in zip(SCALES.items(), drawings, strict=True):
+        classes = [(low, label, colour) for low, _, label, colour in scale.ranges]
+        below = [(0.0, scale.below, "")] if scale.below else []
+        lows, labels, colours = map(np.array, zip(*below, *classes, strict=True))
+        assert drawing["labels"] == labels.tolist()
         with rasterio.open(tmp_path / f"{name}.tif") as read:
             values = read.read(1).astype(np.float64)
-        colours = [None if colour == CLEAR else colour for _, colour in classes.values()]
-        lows = np.array([low for low, _ in classes])
         levels = np.searchsorted(lows, values, side="right") - 1
         # A value at the border of two classes has the colour of either.
         sure = np.isfinite(values) & ~np.isin(values, lows[1:].astype(np.float32))
         sure |= np.isfinite(values) & (name == "ambiguity")  # its classes have no common border
         pixels = np.array(drawing["pixels"])
-        assert (pixels[sure] == np.array(colours, dtype=object)[levels[sure]]).all()
+        shown = np.where(pixels == None, "", pixels)  # noqa: E711 - element by element
+        assert (shown[sure] == colours[levels[sure]]).all()
         assert (pixels[np.isnan(values)] == None).all()  # noqa: E711 - element by element
         assert len({*levels[sure].tolist()}) > 2
 
@@ -145,8 +157,8 @@ def test_style_file_is_replaced_with_the_raster(tmp_path: Path) -> None:
     export_database(database, file)
     assert file.with_suffix(".qml").read_text() == by_pixel(AMBIGUITY) != failed
     # Mean errors have the colours of shares that failed, the larger the darker.
-    assert [colour for _, colour in ERRORS.values()] == [*FAILURES.values()]
-    assert [high for _, high in ERRORS] == [*ERROR_BREAKS, np.inf]
+    assert ERRORS.colours == tuple(FAILURES.values())
+    assert ERRORS.breaks[1:] == (*ERROR_BREAKS, np.inf)
 
 
 def test_large_raster_is_cloud_optimised(tmp_path: Path) -> None:

@@ -27,21 +27,20 @@ from semsig_gis.objects import Licence
 from semsig_gis.output import (
     answer_layers,
     cells_layer,
-    evaluation_layers,
+    evaluation_layer,
+    evaluation_lines_layer,
     export_answer,
     export_database,
     hexagons_layer,
-    layer_fields,
     objects_layer,
     project_archive,
     shown_layers,
-    split_figures,
 )
 
 if TYPE_CHECKING:
     from semsig_gis.localization import Localization, Location
 
-PROGRAM = Path(__file__).parents[1] / "qgis_programs.py"
+PROGRAM = Path(__file__).parents[2] / "qgis_programs.py"
 SVG = "{http://www.w3.org/2000/svg}"
 CITY, OBJECTS = small_city()
 CHANCES, EVALUATION = chances_of(CITY), small_evaluation()
@@ -150,20 +149,19 @@ def test_qgis_evaluates_no_texts_from_data(projects: dict[str, Any]) -> None:
 
 def test_every_field_has_an_alias_and_a_description(tmp_path: Path) -> None:
     file = tmp_path / "city.gpkg"
-    queries, lines = evaluation_layers(EVALUATION, CITY)
+    queries, lines = (make(EVALUATION, CITY) for make in (evaluation_layer, evaluation_lines_layer))
     answers = (
         answer_layers(answer, CITY, search_regions(answer, CITY))
         for answer in (LOCATION, LOCALIZATION)
     )
     layers = [
         *(cells_layer(CITY, identifiability=CHANCES), objects_layer(OBJECTS), lines),
-        *(hexagons_layer(CITY, 9, objects=OBJECTS, evaluation=EVALUATION), *split_figures(queries)),
+        *(hexagons_layer(CITY, 9, objects=OBJECTS, evaluation=EVALUATION), *queries.parts),
         *(layer for answer in answers for layer in answer),
     ]
     for layer in layers:
-        fields = layer_fields(layer)
-        assert all(field.about and field.alias != field.name for field in fields), layer.name
-        assert len({field.alias for field in fields}) == len(fields)
+        assert all(column.about and column.alias != column.name for column in layer.columns)
+        assert len({column.alias for column in layer.columns}) == len(layer.names)
     name = "a\udcff\x01 b"
     first, second = (project_archive(layers, shown_layers(layers, name), name) for _ in range(2))
     assert first == second

@@ -148,7 +148,7 @@ def test_wrong_suffix_missing_file_and_missing_pystac_are_refused(
         export_item(tmp_path / "a.parquet", tmp_path / "a.yaml")
     with refused(DatabaseError, "nowhere.parquet"):
         export_item(tmp_path / "a.parquet", tmp_path / "a.json", objects="nowhere.parquet")
-    monkeypatch.delitem(sys.modules, "semsig_gis.output.files.stac", raising=False)
+    monkeypatch.delitem(sys.modules, "semsig_gis.output.stac", raising=False)
     monkeypatch.setitem(sys.modules, "pystac", None)
     with refused(InputError, "pystac", "semsig_gis[stac]"):
         export_item(tmp_path / "a.parquet", tmp_path / "a.json")

@@ -1,4 +1,4 @@
-"""Write cells as vector tiles (PMTiles): single cells at high zooms, squares of cells at low."""
+"""PMTiles: vector tiles of the cells, single cells at high zooms, squares of cells at low."""
 
 from __future__ import annotations
 
@@ -8,27 +8,19 @@ import math
 import sqlite3
 from typing import TYPE_CHECKING, Any
 
-import geopandas as gpd
-import numpy as np
 import pyarrow as pa
-import pyogrio
-import shapely
 from pmtiles.tile import Compression, TileType, zxy_to_tileid
 from pmtiles.writer import Writer
 
-from semsig_gis.core import GEOMETRY, to_degrees
-from semsig_gis.output.files.tables import feature_stream, write_errors
-from semsig_gis.output.layers.cells import cells_layer
-from semsig_gis.output.layers.hexagons import area_statistics
-from semsig_gis.output.layers.model import table_layer
+from semsig_gis.core import GEOMETRY, InputError, to_degrees
+from semsig_gis.output.features import write_errors, write_features
+from semsig_gis.output.files import writer
 from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.evaluation import Identifiability
     from semsig_gis.output.layers.model import Layer, Progress
 
 
@@ -43,28 +35,26 @@ LARGEST_ZOOM = 22
 OPTIONS = {"MAX_SIZE": "100000000", "MAX_FEATURES": "10000000", "BUFFER": "16"}
 
 
-def write_pmtiles(
-    database: SignatureDatabase,
-    path: str | Path,
-    *,
-    identifiability: Identifiability | None = None,
-    progress: Progress = None,
-) -> None:
+@writer(layers=("cells",), cells=None)
+def write_pmtiles(cells: Layer, path: str | Path, *, progress: Progress = None) -> None:
     """Write the cells as one PMTiles 3 file of vector tiles, atomically.
 
     From the zoom at which a cell is 4 pixels wide, the layer ``cells`` holds every cell. At lower
-    zooms, the layer ``squares`` holds squares of 2 by 2 cells, 4 by 4 and so on (see
-    `hexagons.area_statistics`). The metadata hold the specs, the classes and the licences.
+    zooms, the layer ``squares`` holds squares of 2 by 2 cells, 4 by 4 and so on. The metadata hold
+    the specs, the classes and the licences.
     """
-    cells = cells_layer(database, identifiability=identifiability)
+    if cells.squares is None:
+        raise InputError(
+            f"{path} can contain only layers of cells, not {cells.name!r}; give another suffix."
+        )
     bounds = to_degrees(cells.crs).transform_bounds(*cells.bounds)
-    zooms = _zooms(cells, database.grid.step, latitude=(bounds[1] + bounds[3]) / 2)
+    zooms = _zooms(cells, latitude=(bounds[1] + bounds[3]) / 2)
     fields: dict[str, dict[str, Any]] = {}
     west, south, east, north = (round(side * 1e7) for side in bounds)
     with whole_file(path) as partial, write_errors(path), _tile_writer(partial) as writer:
         for zoom in zooms:
             side = 1 << (zooms[-1] - zoom)  # of a square, in cells
-            layer = cells if side == 1 else _square_layer(database, side, identifiability)
+            layer = cells if side == 1 else cells.squares(side)
             about = fields.setdefault(layer.name, {"id": layer.name, "minzoom": zoom})
             about |= {"maxzoom": zoom, "description": layer.description}
             for tile, content in _tiles(layer, zoom, partial.with_name("zoom.mbtiles")):
@@ -112,50 +102,20 @@ def _tile_writer(path: Path) -> Iterator[Writer]:
                 writer.tile_f.close()
 
 
-def _zooms(cells: Layer, step: float, *, latitude: float) -> range:
+def _zooms(cells: Layer, *, latitude: float) -> range:
     """Return the zooms from the first that shows the city to the first that shows each cell."""
     metres = EQUATOR * math.cos(math.radians(latitude)) / TILE_PIXELS  # of a pixel at zoom 0
     west, south, east, north = cells.bounds
-    last = math.ceil(math.log2(metres * CELL_PIXELS / step))
+    last = math.ceil(math.log2(metres * CELL_PIXELS / cells.cell_size))
     first = math.floor(math.log2(metres * CITY_PIXELS / max(east - west, north - south)))
     last = min(max(last, 0), LARGEST_ZOOM)
     return range(min(max(first, 0), last), last + 1)
 
 
-def _square_layer(
-    database: SignatureDatabase, side: int, identifiability: Identifiability | None
-) -> Layer:
-    """Return the layer of the squares of `side` by `side` cells that contain a cell."""
-    cells = np.stack([database.columns, database.rows], axis=1)
-    squares, areas = np.unique(cells // side, axis=0, return_inverse=True)
-    low = database.grid.origin + squares * (database.grid.step * side)
-    high = low + database.grid.step * side
-    number, areas = len(squares), areas.ravel()
-    columns = area_statistics(database, areas, number, identifiability=identifiability)
-    return table_layer(
-        gpd.GeoDataFrame(columns, geometry=shapely.box(*low.T, *high.T), crs=database.crs),
-        name="squares",
-        title="Squares of cells",
-        description="The cells in each square, together.",
-        geometry="polygon",
-        licenses=(),
-        facts={},
-        styles=(),
-    )
-
-
 def _tiles(layer: Layer, zoom: int, scratch: Path) -> Iterator[tuple[int, bytes]]:
     """Yield the id and the content of each tile of a zoom, in order of the ids."""
-    pyogrio.write_arrow(
-        feature_stream(layer, without=OMITTED_COLUMNS),
-        scratch,
-        layer=layer.name,
-        driver="MBTiles",
-        geometry_name=GEOMETRY,
-        geometry_type="Polygon",
-        crs=layer.crs.to_wkt(),
-        dataset_options={**OPTIONS, "MINZOOM": str(zoom), "MAXZOOM": str(zoom)},
-    )
+    options = {**OPTIONS, "MINZOOM": str(zoom), "MAXZOOM": str(zoom)}
+    write_features(layer, scratch, "MBTiles", without=OMITTED_COLUMNS, dataset_options=options)
     with contextlib.closing(sqlite3.connect(scratch)) as tiles:
         # MBTiles count rows from the south, PMTiles from the north.
         north, query = (1 << zoom) - 1, "SELECT tile_column, tile_row FROM tiles"
