@@ -503,23 +503,6 @@ def test_rule_is_calibrated_and_used(city: Path, run: Run) -> None:
     sentence(run(*calibrate[:-1], 1.5), "--precision was given as 1.5", "from 0.01 to 0.9999")
 
 
-def test_query_may_be_longer_than_any_signature(city: Path, run: Run) -> None:
-    symbols = (CITY.taxonomy.decode(CITY.present_codes) * 60)[:300]  # more than a byte can count
-    angles = ",".join(str(number * 360 / len(symbols)) for number in range(len(symbols)))
-    query = "localize", city, "--types", symbols, "--bearings", angles, "--json"
-    for more in ((), ("--no-refine",), ("--no-refine", "--heading", "unknown"), ("--paper",)):
-        code, out, _ = run(*query, *more)
-        assert code == 0
-        assert json.loads(out)["query"]["length"] == len(symbols)
-
-
-def test_bearings_are_wrapped_to_a_full_turn(city: Path, run: Run) -> None:
-    query = "localize", city, "--types", VIEW["types"][:3], "--json"
-    plain = run(*query, "--bearings", "0,350,20")
-    assert run(*query, "--bearings", "360,-10,20")[1] == plain[1]
-    assert json.loads(plain[1])["query"]["bearings"] == [0.0, 20.0, 350.0]
-
-
 def test_bearings_may_be_from_magnetic_north(city: Path, run: Run) -> None:
     query = "localize", city, *options(VIEW), "--north", "magnetic", "--date", "2024-05-31"
     for more in ((), ("--paper",)):
