@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import importlib
+import json
 import logging
 import os
 import shutil
@@ -13,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import hypothesis
+import jsonschema
 import pytest
 from browser_coverage import BrowserCoverage
 from filelock import FileLock
@@ -142,13 +145,35 @@ def qgis_environment(tmp_path: Path) -> dict[str, str]:
     return qgis_variables(tmp_path)
 
 
+@functools.cache
+def result_validator(command: str) -> jsonschema.Draft202012Validator:
+    """Return the validator of the JSON that a command prints."""
+    from semsig_gis.commands import commands
+    from semsig_gis.commands.schema import result_schema
+
+    schema = result_schema(commands()[command])
+    assert schema is not None
+    return jsonschema.Draft202012Validator(schema)
+
+
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
     """Run the command in this process: exit code, standard output, standard error.
 
-    The first argument is a line as it is typed; those after it may contain spaces.
+    The first argument is a line as it is typed; those after it may contain spaces. JSON is
+    compared with the schema of the command.
     """
-    from semsig_gis.cli import main
+    from semsig_gis.cli import app, main
+
+    def print_json(value: object, *, indent: int | None = 2) -> None:
+        try:
+            result_validator(sys.argv[1]).validate(json.loads(json.dumps(value)))
+        except jsonschema.ValidationError as error:
+            pytest.fail(f"semsig {sys.argv[1]} printed {error.json_path}: {error.message[:2000]}")
+        printing(value, indent=indent)
+
+    printing = app.print_json
+    monkeypatch.setattr(app, "print_json", print_json)
 
     def call(line: object, *arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["semsig", *str(line).split(), *map(str, arguments)])
