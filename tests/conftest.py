@@ -163,17 +163,16 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
     The first argument is a line as it is typed; those after it may contain spaces. JSON is
     compared with the schema of the command.
     """
-    from semsig_gis.cli import app, main
+    from semsig_gis.cli import console, main
 
     def print_json(value: object, *, indent: int | None = 2) -> None:
         try:
             result_validator(sys.argv[1]).validate(json.loads(json.dumps(value)))
         except jsonschema.ValidationError as error:
             pytest.fail(f"semsig {sys.argv[1]} printed {error.json_path}: {error.message[:2000]}")
-        printing(value, indent=indent)
+        console.print_json(value, indent=indent)
 
-    printing = app.print_json
-    monkeypatch.setattr(app, "print_json", print_json)
+    monkeypatch.setattr("semsig_gis.cli.app.print_json", print_json)
 
     def call(line: object, *arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["semsig", *str(line).split(), *map(str, arguments)])

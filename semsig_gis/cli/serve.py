@@ -53,12 +53,11 @@ class Serve:
         store = object_store(city, self.objects, reporter, needed=False)
         # The chosen noise comes first, since the page selects the first one.
         others = {name: other for name, other in NOISES.items() if name != self.noise}
-        options = ["--objects", str(self.objects)] if self.objects is not None else []
         bench = Workbench(
             city=city,
             store=store,
             noises={self.noise: noise} | others,
-            options=[str(self.database), *options],
+            objects=self.objects,
         )
         token = secrets.token_urlsafe(32)
         with open_listener(self.port) as listener:

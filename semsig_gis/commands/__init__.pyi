@@ -1,5 +1,6 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
+from .localize import Localize as Localize
 from .model import GROUPS as GROUPS
 from .model import SILENT as SILENT
 from .model import Command as Command
@@ -17,3 +18,4 @@ from .options import NoiseName as NoiseName
 from .options import Objects as Objects
 from .options import object_store as object_store
 from .options import read_noise as read_noise
+from .route import Route as Route

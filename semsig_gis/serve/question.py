@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from semsig_gis.commands import Localize, Route, command_line
 from semsig_gis.core import (
     FULL_TURN,
     MOST_METRES,
@@ -235,21 +236,21 @@ class Question:
             row |= {"dx": leg.dx, "dy": leg.dy, "sigma": leg.sigma}
         return rows
 
-    def command(self, taxonomy: Taxonomy, *, options: Sequence[str]) -> str:
-        """Return the command line with the same answer; `options` name the database."""
+    def command(self, taxonomy: Taxonomy, **options: Any) -> str:  # noqa: ANN401 - any fields
+        """Return the command line with the same answer; `options` are the database and others."""
         rows = self.rows(taxonomy)
-        words = ["semsig", "localize" if len(rows) == 1 else "route", *options]
-        words += ["--on-grid"] if self.seen_from == "cells" else []
-        words += [] if self.near is None else ["--near", self.near]
-        words += ["--top", str(self.top)] if self.top != DEFAULT_TOP else []
+        options |= {"on_grid": self.seen_from == "cells", "near": self.near, "top": self.top}
         absent = ", ".join(f"no {taxonomy.by_code(code).title.lower()}" for code in self.absent)
-        view_options = _command_options(rows[0]) if len(rows) == 1 else None
+        view_options = _view_options(rows[0]) if len(rows) == 1 else None
         if view_options is not None:
-            return shlex.join([*words, *([absent] if absent else []), *view_options])
+            return command_line(Localize(**options, seen=absent or None, **view_options))
         # Other views have no options of their own: pipe them as JSON lines.
         lines = shlex.join(["printf", "%s\\n", *map(json.dumps, rows)])
-        words += ["--queries", "-"] if len(rows) == 1 else ["-", "--json"]
-        return f"{lines} | {shlex.join(words)}" + (f"  # without: {absent}" if absent else "")
+        if len(rows) == 1:
+            words = command_line(Localize(**options, queries="-"))
+        else:
+            words = f"{command_line(Route(**options, views='-'))} --json"
+        return f"{lines} | {words}" + (f"  # without: {absent}" if absent else "")
 
 
 def _near_text(lat: float, lon: float, metres: float) -> str:
@@ -383,20 +384,20 @@ def _leg(step: _Step) -> Leg:
     return Leg.towards(step.bearing, step.metres, sigma=sigma)
 
 
-def _command_options(row: Mapping[str, Any]) -> list[str] | None:
+def _view_options(row: Mapping[str, Any]) -> dict[str, Any] | None:
     """Return a view as options of `semsig localize`, None if no options exist for it."""
     if {"range_errors", "scores", "photos"} & row.keys():
         return None
     bearings = ",".join(f"{bearing:g}" for bearing in row["bearings"])
-    words = ["--types", row["types"], "--bearings", bearings]
+    options = {"types": row["types"], "bearings": bearings}
     if "ranges" in row:
         ranges = ("?" if metres is None else f"{metres:g}" for metres in row["ranges"])
-        words += ["--ranges", ",".join(ranges)]
+        options["ranges"] = ",".join(ranges)
     if "sectors" in row:
-        words += ["--sectors", ",".join(f"{low:.10g}-{high:.10g}" for low, high in row["sectors"])]
+        options["sectors"] = ",".join(f"{low:.10g}-{high:.10g}" for low, high in row["sectors"])
     if "heading_error" in row:
-        words += ["--heading", str(row["heading_error"] or "known")]
-    return words
+        options["heading"] = str(row["heading_error"] or "known")
+    return options
 
 
 def _absent_codes(names: Sequence[str], taxonomy: Taxonomy) -> tuple[int, ...]:

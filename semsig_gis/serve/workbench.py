@@ -72,7 +72,7 @@ from semsig_gis.serve.question import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -114,8 +114,8 @@ class Workbench:
     noises : mapping of str to Noise, default all named models, ``by-hand`` first
         Noise models that the page offers, by their ``--noise`` value for `semsig localize`; the
         first is the default.
-    options : sequence of str, default the file of the city
-        Database and other options for the command line of `semsig localize`.
+    objects : Path, optional
+        File of the street objects, if it is not the store of the city.
     """
 
     city: City
@@ -123,7 +123,7 @@ class Workbench:
     noises: Mapping[str, Noise] = field(
         default_factory=lambda: {PAGE_NOISE: NOISES[PAGE_NOISE], **NOISES}
     )
-    options: Sequence[str] = ()
+    objects: Path | None = None
     _indexes: dict[tuple[str, str], LikelihoodIndex] = field(default_factory=dict)
     _last: tuple[object, tuple[Location, ...]] | None = None
     _scores: dict[str, CellScores] = field(default_factory=dict)
@@ -319,11 +319,14 @@ class Workbench:
         drawing = answer_drawing(
             location, question, table=table, shares=self._shares, pixels=self._pixels
         )
-        noise = self._noise(question)
-        options = [*(self.options or [str(self.city.path)])]
-        options += ["--noise", noise]
+        command = question.command(
+            self.taxonomy,
+            database=self.city.path,
+            noise=self._noise(question),
+            objects=self.objects,
+        )
         return drawing | {
-            "command": question.command(self.taxonomy, options=options),
+            "command": command,
             "views": question.rows(self.taxonomy),
             "quick": self._is_quick(question),
             "seconds": time.perf_counter() - start,

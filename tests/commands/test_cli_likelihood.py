@@ -417,6 +417,8 @@ def test_noise_is_learnt_from_views_of_unknown_places(city: Path, run: Run) -> N
     assert open_noise(out).name == "noise"
     for options_ in ((), ("--samples", views, "--unlabelled", views)):
         sentence(run(*learn, *options_), "--unlabelled")
+    for option in (("--map-age", 2), ("--drift-report", city.with_name("drift.json"))):
+        sentence(run(*learn, "--unlabelled", views, *option), f"{option[0]} was given with")
     code, printed, err = run("localize", city, "--queries", views, "--adapt", "--top", 1)
     assert code == 0, err
     answers = [json.loads(line) for line in printed.splitlines()]
@@ -494,6 +496,17 @@ def test_rule_is_calibrated_and_used(city: Path, run: Run) -> None:
     report = json.loads(run(*calibrate, "--json")[1])
     assert report["coverage"] >= rule.coverage
     assert report["precision"] == 0.9
+    # Bearings from another north are turned before they are compared.
+    north = North.of("true", CITY.crs, CITY.bounds)
+    turned = [
+        row | {"bearings": [north.from_grid(angle) for angle in row["bearings"] or ()]}
+        for row in samples(60)
+    ]
+    true = written(city.with_name("true.jsonl"), turned)
+    other = city.with_name("other.json")
+    line = "calibrate", city, "--samples", true, "--out", other, "--precision", 0.9
+    assert run(*line, "--no-refine", "--north", "true")[0] == 0
+    assert open_rule(other).threshold == pytest.approx(rule.threshold, abs=1e-6)
     query = "localize", city, *options(VIEW), "--json", "--rule", out
     assert json.loads(run(*query)[1])["threshold"] == open_rule(out).threshold
     code, printed, _ = run("calibrate", city, "--samples", file, "--out", out, "--no-refine")
