@@ -55,13 +55,15 @@ pyogrio.set_gdal_config_options({"OGR_FLATGEOBUF_STREAM_BASE_IMPL": True})
 
 
 _lock = threading.RLock()
+# The CRS that GDAL finds in the database of PROJ for the text of a shapefile, which takes 50 ms.
+_matches: dict[str, str] = {}
 
 
 @contextlib.contextmanager
 def _captured_warnings(*, crs: bool = False) -> Iterator[list[warnings.WarningMessage]]:
     """Collect the warnings of GDAL in the block, for one thread at a time.
 
-    With `crs`, GDAL compares the CRS of a shapefile with the database of PROJ, which takes 50 ms.
+    With `crs`, GDAL compares the CRS of a shapefile with the database of PROJ.
     """
     with _lock, warnings.catch_warnings(record=True) as captured:
         warnings.simplefilter("always")
@@ -87,14 +89,14 @@ def describe(member: Member, *, bounds: bool = False) -> LayerDescription:
     if info["driver"] != member.driver:
         raise not_of_its_kind(member)
     text = info["crs"] or ""
-    crs = usable_crs(text)
-    # The search by GDAL finds the code of more systems.
-    if member.driver == SHAPEFILE and text and (crs is None or not crs.srs.startswith("EPSG:")):
-        crs = usable_crs(_info(member, crs=True)["crs"] or "")
+    if member.driver == SHAPEFILE and text:
+        if text not in _matches:
+            _matches[text] = _info(member, crs=True)["crs"] or ""
+        text = _matches[text]
     layer = LayerDescription(
         geometry=info["geometry_type"] or NO_GEOMETRY,
         fields=tuple(info["fields"]),
-        crs=crs,
+        crs=usable_crs(text),
         rows=info["features"],
         bounds=info["total_bounds"],
     )
