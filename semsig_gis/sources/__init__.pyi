@@ -109,7 +109,6 @@ from .synthetic.city import synthetic_streets as synthetic_streets
 from .synthetic.city import synthetic_surroundings as synthetic_surroundings
 from .synthetic.streets import Network as Network
 from .vector.by_fiona import read_each as read_each
-from .vector.by_pyogrio import LayerDescription as LayerDescription
 from .vector.by_pyogrio import describe as describe
 from .vector.by_pyogrio import read_whole as read_whole
 from .vector.file import LayerInfo as LayerInfo
@@ -117,5 +116,6 @@ from .vector.file import first_rows as first_rows
 from .vector.file import list_layers as list_layers
 from .vector.file import read_layer as read_layer
 from .vector.member import DRIVERS as DRIVERS
+from .vector.member import LayerDescription as LayerDescription
 from .vector.member import Member as Member
 from .vector.member import members as members

@@ -24,7 +24,7 @@ from semsig_gis.sources.rows import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from typing import IO
 
     from semsig_gis.sources.csv_file import CsvFile
@@ -151,13 +151,12 @@ def csv_table(
     if spec is not None and (spec.x_field or spec.y_field):
         return _stated_table(file, spec.x_field, spec.y_field, where=where)
     for separator, names in file.layouts.items():
-        for x_names, y_names in KNOWN_NAMES:
-            x, y = _first(names, x_names), _first(names, y_names)
-            if x and y:
-                return CsvTable(file, separator, x, y)
+        x, y = known_coordinates(names)
+        if x and y:
+            return CsvTable(file, separator, x, y)
     # Geometries contain semicolons and commas but no tabs, so try the tab first.
     for separator, names in reversed(list(file.layouts.items())):
-        if shape := _first(names, SHAPE_NAMES):
+        if shape := known_field(SHAPE_NAMES, names):
             return CsvTable(file, separator, shape=shape)
     if spec is None:
         return CsvTable(file, file.separator)
@@ -182,8 +181,18 @@ def _stated_table(file: CsvFile, x: str | None, y: str | None, *, where: str) ->
     return CsvTable(file, file.separator, x, y)
 
 
-def _first(names: tuple[str, ...], known_names: tuple[str, ...]) -> str | None:
-    return next((name for name in names if name.lower() in known_names), None)
+def known_field(names: Sequence[str], fields: Sequence[str]) -> str | None:
+    """Return the first field with one of the names, which are in lower case."""
+    return next((field for field in fields if field.lower() in names), None)
+
+
+def known_coordinates(fields: Sequence[str]) -> tuple[str | None, str | None]:
+    """Return the first common pair of names for x and y among the fields, or two None."""
+    for xs, ys in KNOWN_NAMES:
+        x, y = known_field(xs, fields), known_field(ys, fields)
+        if x and y:
+            return x, y
+    return None, None
 
 
 def read_csv_layer(

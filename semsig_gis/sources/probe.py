@@ -12,8 +12,7 @@ from semsig_gis.sources.vector.member import DRIVERS
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.sources.vector.by_pyogrio import LayerDescription
-    from semsig_gis.sources.vector.member import Member
+    from semsig_gis.sources.vector.member import LayerDescription, Member
 
 VECTOR_SUFFIXES = frozenset({*DRIVERS, ".zip"} - {".csv"})
 # An answer of Overpass is JSON, too, and has its key "elements" near the beginning.

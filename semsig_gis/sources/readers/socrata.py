@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from semsig_gis.core import SourceError
+from semsig_gis.sources.csv_layer import known_coordinates
 from semsig_gis.sources.services.fetch import service
-from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field, known_coordinates
+from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field
 from semsig_gis.sources.services.pages import (
     Page,
     ServiceQuery,

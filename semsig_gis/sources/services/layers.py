@@ -15,7 +15,7 @@ import shapely.geometry
 from shapely.errors import ShapelyError
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources.csv_layer import KNOWN_NAMES, SHAPE_NAMES
+from semsig_gis.sources.csv_layer import SHAPE_NAMES, known_coordinates, known_field
 from semsig_gis.sources.numbers import decimal
 from semsig_gis.sources.rows import WGS84, BadFeatureError, LayerBuilder
 from semsig_gis.sources.services.table import open_table
@@ -126,20 +126,6 @@ class PositionReader:
                 f"its {self._x} {both[0]!r} and {self._y} {both[1]!r} are not two numbers"
             ) from error
         return x, y
-
-
-def known_field(names: Sequence[str], fields: Sequence[str]) -> str | None:
-    """Return the first field with one of the names, which are in lower case."""
-    return next((field for field in fields if field.lower() in names), None)
-
-
-def known_coordinates(fields: Sequence[str]) -> tuple[str | None, str | None]:
-    """Return the first common pair of names for x and y among the fields, or two None."""
-    for xs, ys in KNOWN_NAMES:
-        x, y = known_field(xs, fields), known_field(ys, fields)
-        if x and y:
-            return x, y
-    return None, None
 
 
 def _shape(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file

@@ -7,7 +7,7 @@ import math
 import struct
 import threading
 import warnings
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from semsig_gis.sources.vector.member import (
     NOT_UTF8,
     OUT_OF_REACH,
     SHAPEFILE,
+    LayerDescription,
     not_of_its_kind,
     unreadable,
 )
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
-    from pyproj import CRS
 
     from semsig_gis.sources.rows import Position
     from semsig_gis.sources.vector.member import Member
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
 GEOMETRY_TYPES = dict(enumerate(("Point", "LineString", "Polygon", "MultiPoint", "MultiLineString",
                         "MultiPolygon"), start=1))  # fmt: skip
 """Geometry types by their codes in well-known binary."""
-UNKNOWN = "Unknown"  # GDAL's geometry type of several types
 SHORTEST_RING = 4  # coordinates
 DIMENSION_BITS = 0xE0000000  # the flags of Z, M and SRID
 MOST_STEP_ROWS = 65_536
@@ -55,32 +54,16 @@ CRS_SEARCH = "USE_OSR_FIND_MATCHES"
 pyogrio.set_gdal_config_options({"OGR_FLATGEOBUF_STREAM_BASE_IMPL": True})
 
 
-@dataclass(frozen=True, slots=True)
-class LayerDescription:
-    """Description of a layer: geometry type, fields, CRS, number of rows and bounds.
-
-    The `crs` is None if the file states none that is known; that of GeoJSON may be `implicit`.
-    `bounds` are west, south, east, north in the unit of the CRS. Of GeoJSON, `empty` are the
-    numbers of the rows without coordinates; geometry type and bounds may be unknown.
-    """
-
-    geometry: str
-    fields: tuple[str, ...]
-    crs: CRS | None
-    rows: int
-    bounds: tuple[float, ...] | None = None
-    implicit: bool = False
-    empty: frozenset[int] = frozenset()
-
-
 _lock = threading.RLock()
+# The CRS that GDAL finds in the database of PROJ for the text of a shapefile, which takes 50 ms.
+_matches: dict[str, str] = {}
 
 
 @contextlib.contextmanager
 def _captured_warnings(*, crs: bool = False) -> Iterator[list[warnings.WarningMessage]]:
     """Collect the warnings of GDAL in the block, for one thread at a time.
 
-    With `crs`, GDAL compares the CRS of a shapefile with the database of PROJ, which takes 50 ms.
+    With `crs`, GDAL compares the CRS of a shapefile with the database of PROJ.
     """
     with _lock, warnings.catch_warnings(record=True) as captured:
         warnings.simplefilter("always")
@@ -98,32 +81,31 @@ def describe(member: Member, *, bounds: bool = False) -> LayerDescription:
     For the `bounds` of GeoJSON, GDAL parses the file as well.
     """
     member.require_sound()
-    geojson = parse_geojson(member) if member.driver == GEOJSON else None
-    if geojson is not None and geojson.fields is not None and not bounds:
-        return LayerDescription(
-            UNKNOWN, geojson.fields, geojson.crs, geojson.rows,
-            implicit=geojson.implicit, empty=geojson.empty,
-        )  # fmt: skip
+    if member.driver == GEOJSON:
+        geojson, complete = parse_geojson(member)
+        if complete and not bounds:
+            return geojson
     info = _info(member)
     if info["driver"] != member.driver:
         raise not_of_its_kind(member)
     text = info["crs"] or ""
-    crs = usable_crs(text)
-    # The search by GDAL finds the code of more systems.
-    if member.driver == SHAPEFILE and text and (crs is None or not crs.srs.startswith("EPSG:")):
-        crs = usable_crs(_info(member, crs=True)["crs"] or "")
-    return LayerDescription(
+    if member.driver == SHAPEFILE and text:
+        if text not in _matches:
+            _matches[text] = _info(member, crs=True)["crs"] or ""
+        text = _matches[text]
+    layer = LayerDescription(
         geometry=info["geometry_type"] or NO_GEOMETRY,
         fields=tuple(info["fields"]),
-        crs=crs if geojson is None else geojson.crs,
+        crs=usable_crs(text),
         rows=info["features"],
         bounds=info["total_bounds"],
-        implicit=geojson is not None and geojson.implicit,
-        # Rows cannot be assigned if GDAL counts differently.
-        empty=geojson.empty
-        if geojson is not None and geojson.rows == info["features"]
-        else frozenset(range(1, info["features"] + 1)),
     )
+    if member.driver != GEOJSON:
+        return layer
+    # Rows cannot be assigned if GDAL counts differently.
+    same = geojson.rows == layer.rows
+    empty = geojson.empty if same else frozenset(range(1, layer.rows + 1))
+    return replace(layer, crs=geojson.crs, implicit=geojson.implicit, empty=empty)
 
 
 def _info(member: Member, *, crs: bool = False) -> dict[str, Any]:

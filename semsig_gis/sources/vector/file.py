@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Rows
-    from semsig_gis.sources.vector.by_pyogrio import LayerDescription
+    from semsig_gis.sources.vector.member import LayerDescription
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.sources.rows import WGS84, usable_crs
-from semsig_gis.sources.vector.member import unreadable
+from semsig_gis.sources.vector.member import UNKNOWN, LayerDescription, unreadable
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
@@ -18,24 +17,11 @@ if TYPE_CHECKING:
 WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
 
 
-@dataclass(frozen=True, slots=True)
-class GeoJson:
-    """The parts of a GeoJSON file that are read without GDAL.
+def parse_geojson(member: Member) -> tuple[LayerDescription, bool]:
+    """Parse a GeoJSON file; return its description, and whether GDAL finds the same rows.
 
-    `crs` is WGS 84 by default, which is `implicit` then, and None if the file states an unknown
-    one. `fields` are those of GDAL; they are None if only GDAL knows which features there are.
-    `rows` is the number of features, `empty` the numbers of those without coordinates.
+    If not, only the CRS is certain. SourceError if it is not valid JSON, which GDAL may accept.
     """
-
-    crs: CRS | None
-    implicit: bool
-    fields: tuple[str, ...] | None
-    rows: int
-    empty: frozenset[int]
-
-
-def parse_geojson(member: Member) -> GeoJson:
-    """Parse a GeoJSON file; SourceError if it is not valid JSON, which GDAL may accept."""
     try:
         with member.open() as stream:
             document = parse_json(stream.read().decode("utf-8-sig", errors="replace"))
@@ -45,14 +31,16 @@ def parse_geojson(member: Member) -> GeoJson:
     listed = document.get("features", [document])
     items = listed if isinstance(listed, list) else []
     features = [item for item in items if isinstance(item, dict) and item.get("type") == "Feature"]
-    regular = len(features) == len(items) > 0
-    return GeoJson(
+    fields = _fields(features)
+    description = LayerDescription(
+        UNKNOWN,
+        fields or (),
         _stated_crs(document["crs"]) if "crs" in document else WGS84,
+        len(features),
         implicit="crs" not in document,
-        fields=_fields(features) if regular else None,
-        rows=len(features),
         empty=frozenset(row for row, item in enumerate(features, 1) if _is_empty(item)),
     )
+    return description, fields is not None and len(features) == len(items) > 0
 
 
 def _stated_crs(stated: Any) -> CRS | None:  # noqa: ANN401 - whatever is in the file

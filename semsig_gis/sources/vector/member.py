@@ -9,11 +9,14 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
 from semsig_gis.sources.paths import require_file
+
+if TYPE_CHECKING:
+    from pyproj import CRS
 
 CSV = "CSV"
 GEOJSON = "GeoJSON"
@@ -38,6 +41,8 @@ FIRST_BYTES = {
     CONTAINER: b"SQLite format 3\0",
     SHAPEFILE: b"\x00\x00\x27\x0a",
 }
+# GDAL's geometry type of a layer with several types.
+UNKNOWN = "Unknown"
 # In an archive with other data, these files contain a legend or metadata.
 SIDE_SUFFIXES = frozenset({".csv", ".json"})
 
@@ -111,6 +116,24 @@ class Member:
                 f"{self.file} cannot be read ({' '.join(verdict.split())}); it may be damaged, so "
                 "download it again."
             )
+
+
+@dataclass(frozen=True, slots=True)
+class LayerDescription:
+    """Description of a layer: geometry type, fields, CRS, number of rows and bounds.
+
+    The `crs` is None if the file states none that is known; that of GeoJSON may be `implicit`.
+    `bounds` are west, south, east, north in the unit of the CRS. Of GeoJSON, `empty` are the
+    numbers of the rows without coordinates; geometry type and bounds may be unknown.
+    """
+
+    geometry: str
+    fields: tuple[str, ...]
+    crs: CRS | None
+    rows: int
+    bounds: tuple[float, ...] | None = None
+    implicit: bool = False
+    empty: frozenset[int] = frozenset()
 
 
 def not_of_its_kind(what: object) -> SourceError:
