@@ -154,17 +154,11 @@ def test_unknown_name_is_refused(name: str, field: Field, run: Run) -> None:
 @pytest.mark.usefixtures("city")
 @pytest.mark.parametrize("name", RUN)
 def test_json_matches_the_schema_and_quiet_prints_only_results(name: str, run: Run) -> None:
-    command = COMMANDS[name]
-    code, out, err = run("", *line_of(name), "--quiet", *(["--json"] if command.returns else []))
+    # The fixture `run` compares JSON with the schema.
+    as_json = ["--json"] if COMMANDS[name].returns else []
+    code, out, err = run("", *line_of(name), "--quiet", *as_json)
     assert (code, err) == (0, "")
-    if command.returns is not None:
-        schema = command_schema(command)["result"]
-        try:
-            values = [json.loads(out)]
-        except json.JSONDecodeError:  # a value for each line
-            values = [json.loads(line) for line in out.splitlines()]
-        for value in values:
-            jsonschema.validate(value, schema)
+    assert out
 
 
 @pytest.mark.usefixtures("city")
