@@ -99,7 +99,7 @@ def show_answer(answer: dict[str, Any], load_style: Any) -> None:  # noqa: ANN40
     Parameters
     ----------
     answer : dict
-        See `semsig_gis.serve.drawing.answer_drawing`.
+        See `semsig_gis.output.answer_drawing`.
     load_style : callable
         Called with a layer and the name of its style.
     """
@@ -120,9 +120,9 @@ def show_answer(answer: dict[str, Any], load_style: Any) -> None:  # noqa: ANN40
         values = {
             "rank": candidate["rank"],
             "rank_high": candidate["rank"],
-            "cell_id": candidate["cell"],
+            "cell_id": candidate["cell_id"],
             "types": candidate["types"],
-            "length": len(candidate["types"]),
+            "length": candidate["length"],
             "chance": candidate["chance"],
         }
         rows.append((QgsGeometry.fromPointXY(QgsPointXY(lon, lat)), values))

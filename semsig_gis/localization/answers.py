@@ -142,7 +142,7 @@ class Answer(Displayed):
         """Draw the possible places of the query (see `plot_answer`)."""
         return plot_with("plot_answer", self, ax=ax, legend=legend)
 
-    def _candidate_records(self) -> list[Any]:
+    def candidate_rows(self) -> list[Any]:
         """Return the candidates as plain values, with ``lon`` and ``lat`` rounded to 1 cm."""
         lon, lat = np.round(to_degrees(self.crs).transform(self.columns["x"], self.columns["y"]), 7)
         columns = {**self.columns, "lon": lon, "lat": lat}

@@ -43,6 +43,9 @@ from .html.cells import ambiguity_map as ambiguity_map
 from .html.cells import identifiability_legend as identifiability_legend
 from .html.cells import identifiability_map as identifiability_map
 from .html.city import city_map as city_map
+from .html.drawing import REGION_COLOURS as REGION_COLOURS
+from .html.drawing import answer_drawing as answer_drawing
+from .html.drawing import region_levels as region_levels
 from .html.drift import drift_legend as drift_legend
 from .html.drift import drift_map as drift_map
 from .html.evaluation import evaluation_legend as evaluation_legend
@@ -54,14 +57,12 @@ from .html.image import mercator as mercator
 from .html.image import place_lattices as place_lattices
 from .html.image import script_json as script_json
 from .html.location import RAYS as RAYS
-from .html.location import REGION_COLOURS as REGION_COLOURS
 from .html.location import SECTOR as SECTOR
 from .html.location import localization_legend as localization_legend
 from .html.location import localization_map as localization_map
 from .html.location import location_legend as location_legend
 from .html.location import location_map as location_map
 from .html.location import posterior_map as posterior_map
-from .html.location import region_levels as region_levels
 from .html.objects import ground_map as ground_map
 from .html.objects import objects_legend as objects_legend
 from .html.objects import objects_map as objects_map

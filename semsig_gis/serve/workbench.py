@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core import (
+    CHANCES,
     FULL_TURN,
     VERDICTS,
     InputError,
@@ -54,22 +55,25 @@ from semsig_gis.output import (
     MAX_ZOOM,
     OUTLINES,
     RAYS,
+    REGION_COLOURS,
     CellPixels,
+    answer_drawing,
     city_image,
     corners_of,
     data_url,
     exact_latlon,
     export_answer,
     panel_signs,
+    region_levels,
     to_metres,
 )
-from semsig_gis.serve.drawing import answer_drawing, class_shares
 from semsig_gis.serve.question import (
     PageBoxes,
     PagePlace,
     PageSimulation,
     Question,
 )
+from semsig_gis.serve.reasons import class_shares, place_reasons
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -315,10 +319,14 @@ class Workbench:
         """Return the answer to a question as the page shows it."""
         start = time.perf_counter()
         question, location = self._located(body)
-        table = self._index(question).table
-        drawing = answer_drawing(
-            location, question, table=table, shares=self._shares, pixels=self._pixels
-        )
+        drawing = answer_drawing(location)
+        marks, table = question.marks[question.place_number], self._index(question).table
+        codes = {item.name: item.code for item in self.database.taxonomy.classes}
+        for candidate in drawing["candidates"]:
+            rays = candidate["rays"]
+            for ray in rays:
+                ray["mark"] = None if ray["query"] is None else list(marks[ray["query"]])
+            candidate["for_against"] = place_reasons(rays, codes, table=table, shares=self._shares)
         command = question.command(
             self.taxonomy,
             database=self.city.path,
@@ -326,10 +334,43 @@ class Workbench:
             objects=self.objects,
         )
         return drawing | {
+            "region": self._region(location),
+            "truth": None if question.truth is None else self._truth(location, question.truth),
             "command": command,
             "views": question.rows(self.taxonomy),
             "quick": self._is_quick(question),
             "seconds": time.perf_counter() - start,
+        }
+
+    def _region(self, location: Location) -> dict[str, Any]:
+        """Return the regions of an answer, with an image of the city."""
+        levels = region_levels(location.posterior)
+        image, bounds = self._pixels.image(self._pixels.levels(levels), REGION_COLOURS, effort=1)
+        return {
+            "text": location.region_text,
+            "image": data_url(image),
+            "bounds": bounds,
+            "counts": {
+                f"{share:g}": int((levels >= level).sum())
+                for level, share in enumerate(sorted(CHANCES, reverse=True), start=1)
+            },
+            "colours": {f"{share:g}": colour for share, colour in CHANCES.items()},
+        }
+
+    def _truth(self, location: Location, place: tuple[float, float]) -> dict[str, Any]:
+        """Return the distance from the true place, and the rank and chance of its cell."""
+        xy = to_metres(place, self.database.crs)
+        (x, y), estimate = xy[0].tolist(), location.estimate
+        metres = math.hypot(x - estimate.x, y - estimate.y)
+        # The true place may be outside all cells, which gives -1.
+        cell = int(self.database.cells_at(xy)[0])
+        chances = location.chances
+        return {
+            "place": list(place),
+            "metres": metres,
+            "found": metres <= location.rule.radius,
+            "rank": None if cell < 0 else int((chances > chances[cell]).sum()) + 1,
+            "chance": None if cell < 0 else float(chances[cell]),
         }
 
     def export(self, body: object, suffix: str) -> bytes:

@@ -165,7 +165,7 @@ def test_quick_answer_has_the_same_best_cell(
         assert (quick["quick"], after["quick"]) == (True, False)
         for answer, count in ((quick, 3), (after, 10)):
             assert sum(bool(view["rays"]) for view in answer["candidates"]) == count
-        assert quick["candidates"][0]["cell"] == after["candidates"][0]["cell"]
+        assert quick["candidates"][0]["cell_id"] == after["candidates"][0]["cell_id"]
         del after["seconds"], expected["seconds"]
         assert after == json.loads(json.dumps(expected))
     grid = {"views": [view], "quick": True, "seen_from": "cells"}
@@ -246,7 +246,7 @@ def test_command_line_returns_the_same_answer(
     out = run_ok("", *words, *([] if lines else ["--json"]))
     result = json.loads(out.splitlines()[-1] if lines else out)
     listed = [(row["cell_id"], row["chance"]) for row in result["candidates"]]
-    shown = [(row["cell"], row["chance"]) for row in answer["candidates"]]
+    shown = [(row["cell_id"], row["chance"]) for row in answer["candidates"]]
     assert listed == [(cell, pytest.approx(chance)) for cell, chance in shown]
     place = [result["place"]["lat"], result["place"]["lon"]]
     assert answer["estimate"]["place"] == pytest.approx(place, abs=1e-6)
@@ -431,7 +431,7 @@ def test_cell_request_returns_the_view_from_its_middle(page: Page) -> None:
     assert reply["alike"] == types.count(reply["types"]) - 1
     question = {"views": [reply["view"]], "seen_from": "cells", "top": 3}
     best = page.ask("/api/answer", question)["candidates"][0]
-    assert (best["cell"], best["types"]) == (reply["cell"], reply["types"])
+    assert (best["cell_id"], best["types"]) == (reply["cell"], reply["types"])
     page.refused("/api/cell", {"place": [0.0, 0.0]}, "no cell")
 
 

@@ -131,7 +131,7 @@ class Localization(Answer):
             "notes": list(self.notes),
             "crs": self.crs.to_string(),
             "licenses": list(self.licenses),
-            "candidates": self._candidate_records(),
+            "candidates": self.candidate_rows(),
         }
 
 

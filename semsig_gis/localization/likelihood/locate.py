@@ -229,7 +229,7 @@ class Location(Answer):
         keys of `known` and ``ratio``; it is None without a prior.
         """
         lon, lat = to_degrees(self.crs).transform(self.estimate.x, self.estimate.y)
-        candidates = self._candidate_records()
+        candidates = self.candidate_rows()
         for candidate, why in zip(candidates, self.explanations, strict=False):
             candidate["explanation"] = why.to_dict(self.north)
         threshold, ratio = self.rule.threshold, self.prior_ratio

@@ -11,7 +11,13 @@ from semsig_gis.core import ANSWERS, CANDIDATE_RAMP, CELL_CHANCES, CHANCES, VERD
 from semsig_gis.database import rows_of_result
 from semsig_gis.localization import DEFAULT_RULE
 from semsig_gis.localization import VERDICTS as COUNTED
-from semsig_gis.observation import GRID_NORTH, View
+from semsig_gis.observation import GRID_NORTH
+from semsig_gis.output.html.drawing import (
+    REGION_COLOURS,
+    answer_drawing,
+    region_levels,
+    sector_outlines,
+)
 from semsig_gis.output.html.image import level_image
 from semsig_gis.output.html.page_elements import (
     FLIPPING,
@@ -43,18 +49,21 @@ from semsig_gis.output.html.page_elements import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping, Sequence
+
     import folium
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
-    from semsig_gis.localization import Answer, Explanation, Localization, Location, Posterior
+    from semsig_gis.localization import Answer, Localization, Location, Posterior
 
 
 Image = tuple[bytes, list[list[float]]]  # a PNG, and latitudes and longitudes of its corners
 PLACE_FIELDS = ("Chance", "Place", "Standard deviation", "North of the query", "Cell")
 BEST_FIELDS = ("Chance", "Cell sees", "Cell", "Place")
+# Facts that an answer or an object lacks are not shown.
 CANDIDATE_FIELDS = (
-    *("Query", "Cell sees", "Chance", "Chance of the cell", "Log-likelihood"),
+    *("Query", "Cell sees", "Rank", "Chance", "Chance of the cell", "Log-likelihood", "Distance"),
     *("North of the query", "Cell", "Place"),
 )
 OBJECT_FIELDS = (
@@ -78,10 +87,8 @@ RAYS: dict[str, tuple[str, dict[str, object]]] = {
 }
 CANDIDATE = "#ffffff"
 SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
-REGION_COLOURS = [CHANCES[share] for share in sorted(CHANCES, reverse=True)]
 SURROUNDINGS_M = 45.0  # smallest distance that is shown around the answer
 CLOSEST_ZOOM = 20
-ARC_POINTS = 72  # of the outline of a sector
 
 
 def location_map(
@@ -112,21 +119,20 @@ def location_map(
     >>> location_map(locate(index, demo_database.signature(0))).options["maxZoom"]
     20
     """
-    database = location.posterior.database
-    layers = _LocationLayers(location)
+    database, drawing = location.posterior.database, answer_drawing(location)
     page = start_map(map_, tiles, title="Where it was seen")
     near = location.answer.given
     _colour_chances(page, location.posterior, radius=location.rule.radius, near=near)
-    for number, explanation in enumerate(location.explanations, start=1):
-        name, parts = f"Objects from rank {number}", layers.explanation(explanation)
+    explained = zip(location.explanations, drawing["candidates"], strict=False)
+    for number, (explanation, candidate) in enumerate(explained, start=1):
+        sectors = sector_outlines(location, explanation)
+        parts = _object_parts(candidate["rays"], {*explanation.counts}, sectors)
+        name = f"Objects from rank {number}"
         add_layer(page, name, "drawings", parts, group="answer", show=number == 1)
-    candidates = layers.candidates()
-    name = f"Candidates ({len(candidates):,})"
-    # The best last, so that they lie on top.
-    signs = panel_signs(database)
-    add_layer(page, name, "points", CANDIDATE_FIELDS, signs, candidates[::-1], group="answer")
-    add_layer(page, "Best place", "drawings", layers.place(), group="answer")
-    legend, view = location_legend(location), layers.view() if map_ is None else None
+    cells = location.columns["cell"].tolist()
+    _add_candidates(page, location, database, cells, colours=[CANDIDATE] * len(cells))
+    add_layer(page, "Best place", "drawings", _place_parts(location, drawing), group="answer")
+    legend, view = location_legend(location), _corners(location) if map_ is None else None
     return finish_map(page, database, legend=legend, view=view, zoom=CLOSEST_ZOOM)
 
 
@@ -202,141 +208,127 @@ def _chances(posterior: Posterior, chances: NDArray[np.float64]) -> Image:
     return _image(posterior, levels, list(CELL_CHANCES.values()))
 
 
-def region_levels(posterior: Posterior) -> NDArray[np.uint8]:
-    """Return the level of the smallest region that contains each cell, or 0.
-
-    Level 1 is the region of the largest share of `CHANCES`: the fewest cells that contain it.
-    """
-    levels = np.zeros(len(posterior.database), np.uint8)
-    for level, share in enumerate(sorted(CHANCES, reverse=True), start=1):
-        levels[posterior.credible_cells(share)] = level
-    return levels
-
-
 def _image(posterior: Posterior, levels: NDArray[np.integer], colours: list[str]) -> Image:
     """Return an image of the cells with a level above 0 and of the likeliest cell."""
     cells = np.union1d(np.flatnonzero(levels), [int(posterior.chances.argmax())])
     return level_image(posterior.database.select(cells), levels[cells].astype(np.uint8), colours)
 
 
-class _LocationLayers:
-    """Layers of the map of a location, as plain values for the script of the page."""
+def _corners(location: Location) -> NDArray[np.float64]:
+    """Return the corners of the first view: around the answer, or all candidates without one."""
+    place = location.estimate
+    middle = np.array([[place.x, place.y]])
+    if location.answer.given:
+        around = max(SURROUNDINGS_M, 1.5 * place.ellipse()[0])
+        corners = np.concatenate([middle - around, middle + around])
+    else:
+        corners = np.concatenate([middle, _viewpoints(location)])
+    return to_latlon(corners, location.crs)
 
-    def __init__(self, location: Location) -> None:
-        self.location = location
-        self.database = location.posterior.database
-        self.titles = {item.name: item.title for item in self.database.taxonomy.classes}
 
-    def latlon(self, xy: ArrayLike) -> list[list[float]]:
-        return exact_latlon(xy, self.database.crs)
+def _viewpoints(answer: Answer) -> NDArray[np.float64]:
+    """Return the viewpoints of the candidates in metres, shape (n, 2)."""
+    return np.stack([answer.columns["x"], answer.columns["y"]], axis=1)
 
-    def view(self) -> NDArray[np.float64]:
-        """Return the corners of the first view."""
-        place = self.location.estimate
-        middle = np.array([[place.x, place.y]])
-        if self.location.answer.given:
-            around = max(SURROUNDINGS_M, 1.5 * place.ellipse()[0])
-            corners = np.concatenate([middle - around, middle + around])
-        else:
-            corners = np.concatenate([middle, self.location.candidates[["x", "y"]].to_numpy()])
-        return to_latlon(corners, self.database.crs)
 
-    def place(self) -> list[list[Any]]:
-        """Return the best place and its ellipse."""
-        location, place = self.location, self.location.estimate
-        longer, shorter, bearing = place.ellipse()
-        (centre,) = self.latlon([place.x, place.y])
-        name, mark = (
-            ("The answer", ANSWERS["given"])
-            if location.answer.given
-            else ("Cannot tell: the best place", ANSWERS["withheld"])
-        )
-        ellipse = f"{longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across"
+def _place_parts(location: Location, drawing: Mapping[str, Any]) -> list[list[Any]]:
+    """Return the drawing of the best place and its ellipse."""
+    place, estimate = location.estimate, drawing["estimate"]
+    longer, shorter, bearing = place.ellipse()
+    name, mark = (
+        ("The answer", ANSWERS["given"])
+        if drawing["given"]
+        else ("Cannot tell: the best place", ANSWERS["withheld"])
+    )
+    ellipse = f"{longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across"
+    details = [
+        f"{percent(drawing['mass'])} within {drawing['radius']:g} m",
+        _position(estimate["place"]),
+        f"if there, {place.sigma:.1f} m each way; 90 %: {ellipse}",
+        _north(place.heading, place.heading_sigma),
+        str(location.cell_id),
+    ]
+    outline = {"color": mark.colour, "weight": 3, "opacity": 0.9}
+    record = [estimate["place"], mark.colour, 6, name, details]
+    return [
+        ["lines", [[outline, [estimate["ellipse"]]]]],
+        ["points", PLACE_FIELDS, {}, [record], OUTLINES[mark.shape]],
+    ]
+
+
+def _object_parts(
+    rays: Sequence[Mapping[str, Any]], counted: Collection[str], sectors: list[list[list[float]]]
+) -> list[list[Any]]:
+    """Return the drawing of the rays of a candidate, the street objects and the photo sectors."""
+    lines: list[list[Any]] = []
+    for verdict, (_, look) in RAYS.items():
+        ends = [[ray["from"], ray["to"]] for ray in rays if ray["verdict"] == verdict]
+        if ends or verdict in counted:
+            lines.append([{"color": VERDICTS[verdict], **look}, ends])
+    if sectors:
+        lines.append([SECTOR, sectors])
+    records = []
+    for ray in rays:
+        error = ray["bearing_error"]
         details = [
-            f"{percent(location.answer.mass)} within {location.rule.radius:g} m",
-            _position(centre),
-            f"if there, {place.sigma:.1f} m each way; 90 %: {ellipse}",
-            _north(place.heading, place.heading_sigma),
-            str(location.cell_id),
+            f"{ray['chance']:.2f}",
+            ray["seen_title"],
+            _degrees(ray["seen_bearing"], ray["seen_range"]),
+            ray["object_title"],
+            _degrees(ray["bearing"], ray["distance"]),
+            None if error is None else f"{error:+.1f}°",
+            ray["source"],
+            ray["source_id"],
         ]
-        record = [centre, mark.colour, 6, name, details]
-        outline = {"color": mark.colour, "weight": 3, "opacity": 0.9}
-        return [
-            ["lines", [[outline, [self.latlon(place.outline())]]]],
-            ["points", PLACE_FIELDS, {}, [record], OUTLINES[mark.shape]],
+        verdict = ray["verdict"]
+        records.append([ray["sign"], VERDICTS[verdict], 6, verdict.capitalize(), details])
+    return [["lines", lines], ["points", OBJECT_FIELDS, {}, records]]
+
+
+def _add_candidates(
+    map_: folium.Map,
+    answer: Answer,
+    database: SignatureDatabase,
+    cells: Sequence[int],
+    *,
+    colours: Sequence[str],
+) -> None:
+    """Add the candidates in some colours; `cells` are their rows in the database."""
+    query, taxonomy, radius = answer.grid_query, database.taxonomy, database.spec.radius
+    texts: dict[str, Callable[[Any], str | None]] = {
+        "chance": percent,
+        "cell_chance": percent,
+        "loglik": "{:.2f}".format,
+        "distance": "{:.4f}".format,
+        "heading": _north,
+        "cell_id": str,
+    }
+    records = []
+    rows = zip(
+        answer.candidate_rows(),
+        cells,
+        exact_latlon(_viewpoints(answer), database.crs),
+        colours,
+        strict=True,
+    )
+    for row, cell, place, colour in rows:
+        turn = row.get("heading") or 0.0
+        # A rank of its own is the label of the sign, a range of ranks is a fact.
+        tied = "rank" not in row
+        ranks = ranks_text(row["rank_low"], row["rank_high"]) if tied else f"{row['rank']:,}"
+        details = [
+            query_signature(query, taxonomy, radius=radius, place=place, turn=turn),
+            cell_signature(database, cell, query, turn, place=place),
+            f"{ranks} of {answer.cells:,}{ties_text(row['tied'])}" if tied else None,
+            *(None if row.get(name) is None else text(row[name]) for name, text in texts.items()),
+            _position(place),
         ]
-
-    def candidates(self) -> list[list[Any]]:
-        """Return the candidates, likeliest first."""
-        rows = self.location.candidates
-        query = self.location.grid_query
-        taxonomy, radius = self.database.taxonomy, self.database.spec.radius
-        records = []
-        places = self.latlon(rows[["x", "y"]].to_numpy())
-        for place, row in zip(places, rows.to_dict("records"), strict=True):
-            turn = row.get("heading") or 0.0
-            details = [
-                query_signature(query, taxonomy, radius=radius, place=place, turn=turn),
-                cell_signature(self.database, row["cell"], query, turn, place=place),
-                percent(row["chance"]),
-                percent(row["cell_chance"]),
-                f"{row['loglik']:.2f}",
-                _north(row.get("heading")),
-                str(row["cell_id"]),
-                _position(place),
-            ]
-            name = f"Rank {row['rank']:,}"
-            records.append([place, CANDIDATE, 8, name, details, str(row["rank"])])
-        return records
-
-    def explanation(self, explanation: Explanation) -> list[list[Any]]:
-        """Return the rays of the query and the street objects."""
-        here = np.array(explanation.xy)
-        rays: dict[str, list[list[list[float]]]] = {verdict: [] for verdict in VERDICTS}
-        records = []
-        shapes = explanation.table.geometry
-        ends = explanation.ends(self.database.reach)
-        for row, shape, end in zip(explanation.to_dict()["rows"], shapes, ends, strict=True):
-            verdict = row["verdict"]
-            rays[verdict].append(self.latlon(np.stack([here, end])))
-            # Without a street object, the sign is at the end of the ray.
-            place = end if shape is None else np.array([shape.x, shape.y])
-            details = [
-                f"{row['chance']:.2f}",
-                self._title(row["query_class"]),
-                _degrees(row["query_bearing"], row["query_range"]),
-                self._title(row["object_class"]),
-                _degrees(row["object_bearing"], row["distance"]),
-                None if row["bearing_error"] is None else f"{row['bearing_error']:+.1f}°",
-                row["source"],
-                row["source_id"],
-            ]
-            name = verdict.capitalize()
-            records.append([*self.latlon(place), VERDICTS[verdict], 6, name, details])
-        lines: list[list[Any]] = [
-            [{"color": VERDICTS[verdict], **look}, rays[verdict]]
-            for verdict, (_, look) in RAYS.items()
-            if rays[verdict] or verdict in explanation.counts
-        ]
-        lines += [[SECTOR, sectors] for sectors in [self._sectors(explanation)] if sectors]
-        return [["lines", lines], ["points", OBJECT_FIELDS, {}, records]]
-
-    def _sectors(self, explanation: Explanation) -> list[list[list[float]]]:
-        """Return the outlines of the photo sectors at a place, out to the visibility range."""
-        photos = View.of(self.location.grid_query).photos
-        outlines = []
-        for photo, turn in zip(photos, explanation.headings, strict=True):
-            for low, high in photo.turned(turn).sectors:
-                bearings = np.radians(np.linspace(low, high, ARC_POINTS))
-                arc = np.stack([np.sin(bearings), np.cos(bearings)], axis=1)
-                corners = np.concatenate([[[0.0, 0.0]], arc, [[0.0, 0.0]]])
-                away = self.database.spec.radius * corners
-                outlines.append(self.latlon(np.array(explanation.xy) + away))
-        return outlines
-
-    def _title(self, name: str | None) -> str | None:
-        """Return the title of a class; "unknown" and None are returned unchanged."""
-        return self.titles.get(name, name) if name is not None else None
+        size = 8 if not tied else 9 if row["rank_low"] == 1 else 6
+        label = [] if tied else [str(row["rank"])]
+        records.append([place, colour, size, f"Rank {ranks}", details, *label])
+    name, signs = f"Candidates ({len(records):,})", panel_signs(database)
+    # The best last, so that they lie on top.
+    add_layer(map_, name, "points", CANDIDATE_FIELDS, signs, records[::-1], group="answer")
 
 
 def _position(place: list[float]) -> str:
@@ -413,9 +405,6 @@ def _chances_legend(posterior: Posterior) -> str:
     )
 
 
-RANK_FIELDS = ("Query", "Signature", "Rank", "Distance", "Cell", "Position")
-
-
 def localization_map(
     localization: Localization,
     database: SignatureDatabase,
@@ -452,61 +441,31 @@ def localization_map(
     >>> localization_map(localization, demo_database).options["maxZoom"]
     20
     """
-    xy = localization.candidates[["x", "y"]].to_numpy(np.float64)
-    places = to_latlon(xy, database.crs)
-    records = _candidate_records(localization, database, places)
+    columns = localization.columns
+    ids, types = columns["cell_id"], columns["types"]
+    cells = rows_of_result(database, ids, types, what="localization")
+    # Colours are scaled to the range of distances, which is 0 for equal candidates.
+    away = columns["distance"] - columns["distance"].min()
+    colours = mixed(away / (away.max() or 1.0), CANDIDATE_RAMP)
     page = start_map(map_, tiles, title="Candidate places")
     add_city(page, database)
-    name = f"Candidates ({len(records):,})"
-    # The best last, so that they lie on top.
-    signs = panel_signs(database)
-    add_layer(page, name, "points", RANK_FIELDS, signs, records[::-1], group="answer")
+    _add_candidates(page, localization, database, cells.tolist(), colours=colours)
     legend = localization_legend(localization)
-    return finish_map(page, database, legend=legend, view=places if map_ is None else None)
-
-
-def _candidate_records(
-    localization: Localization, database: SignatureDatabase, places: NDArray[np.float64]
-) -> list[list[Any]]:
-    """Return a record for the script of each candidate, best first."""
-    candidates = localization.candidates
-    rows = rows_of_result(database, candidates["cell_id"], candidates["types"], what="localization")
-    distances = candidates["distance"].to_numpy(np.float64)
-    # Colours are scaled to the range of distances, which is 0 for equal candidates.
-    spread = np.ptp(distances) or 1.0
-    colours = mixed((distances - distances.min()) / spread, CANDIDATE_RAMP)
-    query = localization.grid_query
-    taxonomy, radius_m = database.taxonomy, database.spec.radius
-    records = []
-    for number, candidate in enumerate(candidates.to_dict("records")):
-        rank = ranks_text(candidate["rank_low"], candidate["rank_high"])
-        place = places[number].tolist()
-        details = [
-            query_signature(query, taxonomy, radius=radius_m, place=place),
-            cell_signature(database, int(rows[number]), query, place=place),
-            f"{rank} of {len(database):,}{ties_text(candidate['tied'])}",
-            f"{candidate['distance']:.4f}",
-            str(candidate["cell_id"]),
-            _position(place),
-        ]
-        radius = 9 if candidate["rank_low"] == 1 else 6
-        records.append([place, colours[number], radius, f"Rank {rank}", details])
-    return records
+    view = to_latlon(_viewpoints(localization), database.crs) if map_ is None else None
+    return finish_map(page, database, legend=legend, view=view)
 
 
 def localization_legend(localization: Localization) -> str:
     """Return the legend of `localization_map` as HTML with data escaped."""
-    candidates = localization.candidates
-    more = localization.tied_beyond
+    distances, more = localization.columns["distance"], localization.tied_beyond
     cells = "1 more cell is" if more == 1 else f"{more:,} more cells are"
     beyond = f"<br>{cells} as good as the last one" if more else ""
-    distances = candidates["distance"]
     method = f"{escape(str(localization.method))}, by {escape(localization.used)}"
     query = f"<p>{query_text(localization.query, localization.taxonomy)}</p>"
     ramp = ramp_bar(CANDIDATE_RAMP, f"{distances.min():.3f}", f"{distances.max():.3f}")
     return (
         "<summary>Candidate places</summary>"
-        f"<p>The best <b>{len(candidates):,}</b> of {localization.cells:,} cells{beyond}<br>"
+        f"<p>The best <b>{len(distances):,}</b> of {localization.cells:,} cells{beyond}<br>"
         f"{method_text(method)}</p>{_notes(localization)}"
         f"{layer_part('Candidates', f'<p>Distance to the query (large sign: rank 1){ramp}</p>')}"
         f"{shades_part()}{folded_part('The query', query)}{credits_part(localization.licenses)}"

@@ -172,7 +172,7 @@ def test_localization_map_describes_candidates(page: MapPage) -> None:
     # The query and what the cell sees, side by side.
     page.ask("circles(arguments[0])[0].fire('click')", CANDIDATE_RAMP[0])
     captions = [element.get_property("innerText") for element in page.all("figcaption")]
-    assert captions == ["Query", "Signature, to 30 m"]
+    assert captions == ["Query", "Cell sees, to 30 m"]
     page.ask("semsig.hide(map)")
     assert f"Types: {CITY.types(LONGEST)}" in page.text(LEGEND)
     page.switch("Candidates")
