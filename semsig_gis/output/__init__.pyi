@@ -37,6 +37,13 @@ from .files.csv import as_written as as_written
 from .files.csv import formula_safe as formula_safe
 from .files.tif import export_geotiff as export_geotiff
 from .html.answer import RASTER_SUFFIXES as RASTER_SUFFIXES
+from .html.answer import RAYS as RAYS
+from .html.answer import SECTOR as SECTOR
+from .html.answer import localization_legend as localization_legend
+from .html.answer import localization_map as localization_map
+from .html.answer import location_legend as location_legend
+from .html.answer import location_map as location_map
+from .html.answer import posterior_map as posterior_map
 from .html.cells import Cells as Cells
 from .html.cells import ambiguity_legend as ambiguity_legend
 from .html.cells import ambiguity_map as ambiguity_map
@@ -56,13 +63,6 @@ from .html.image import level_image as level_image
 from .html.image import mercator as mercator
 from .html.image import place_lattices as place_lattices
 from .html.image import script_json as script_json
-from .html.location import RAYS as RAYS
-from .html.location import SECTOR as SECTOR
-from .html.location import localization_legend as localization_legend
-from .html.location import localization_map as localization_map
-from .html.location import location_legend as location_legend
-from .html.location import location_map as location_map
-from .html.location import posterior_map as posterior_map
 from .html.objects import ground_map as ground_map
 from .html.objects import objects_legend as objects_legend
 from .html.objects import objects_map as objects_map

@@ -115,7 +115,7 @@ def test_answers_of_all_formats_are_drawn(run_ok: RunOk, suffix: str) -> None:
     assert '"Regions to search (' in page
     assert '"Region 1"' in page
     assert ('"Candidates (10)"' in page) == (suffix in {"gpkg", "geojson", "kml"})
-    assert ('"Candidate 10"' in page) == (suffix in {"gpkg", "geojson", "kml"})
+    assert ('"Rank 10"' in page) == (suffix in {"gpkg", "geojson", "kml"})
 
 
 @pytest.mark.parametrize("name", ["objects.parquet", "words.geojson", "cells.gpkg"])

@@ -1,4 +1,4 @@
-"""Map of an exported answer: the regions to search and the candidates of a vector file."""
+"""Maps of one answer: by likelihood, by chances only, by distance, and from an exported file."""
 
 from __future__ import annotations
 
@@ -6,37 +6,456 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
+import numpy as np
 import pandas as pd
 import pyogrio
 import shapely
 
-from semsig_gis.core import CHANCES, InputError, percent
-from semsig_gis.database import require_same_place
-from semsig_gis.output.html.location import CANDIDATE
+from semsig_gis.core import (
+    ANSWERS,
+    CANDIDATE_RAMP,
+    CELL_CHANCES,
+    CHANCES,
+    VERDICTS,
+    InputError,
+    mixed,
+    percent,
+)
+from semsig_gis.database import require_same_place, rows_of_result
+from semsig_gis.localization import DEFAULT_RULE
+from semsig_gis.localization import VERDICTS as COUNTED
+from semsig_gis.output.html.drawing import (
+    REGION_COLOURS,
+    answer_drawing,
+    described_points,
+    region_levels,
+    sector_outlines,
+)
+from semsig_gis.output.html.image import level_image
 from semsig_gis.output.html.page_elements import (
+    FLIPPING,
+    OUTLINES,
     add_city,
     add_layer,
+    cell_image,
+    cell_signature,
+    colour_cells,
     corners_of,
     credits_part,
+    escaped_text,
     exact_latlon,
     finish_map,
+    folded_part,
+    layer_part,
+    mark_svg,
+    method_text,
+    panel_signs,
+    query_signature,
+    ramp_bar,
+    ranks_text,
     shades_part,
     start_map,
     swatch,
+    ties_text,
+    to_latlon,
+)
+from semsig_gis.output.layers.answer import (
+    CANDIDATE_FORM,
+    OBJECT_FORM,
+    PLACE_FORM,
+    REGION_FORM,
+    place_row,
+)
+from semsig_gis.output.tables.answer import (
+    north_sentences,
+    note_sentences,
+    place_sentences,
+    query_sentences,
+    tie_sentences,
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
     import folium
+    from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Answer, Localization, Location, Posterior
+    from semsig_gis.output.layers.columns import Form
 
 RASTER_SUFFIXES = frozenset({".tif", ".tiff"})
 """Suffixes of files with the chance of every cell, which `open_posterior` reads instead."""
 
 POLYGONAL = 2
-FIELDS = ("Chance", "Cells", "Square kilometres", "Sees", "Cell")
-COLUMNS = ("chance", "cells", "km2", "types", "cell_id")
+Image = tuple[bytes, list[list[float]]]  # a PNG, and latitudes and longitudes of its corners
+# Columns that the panel shows.
+PLACE_NAMES = (
+    *("chance", "within_m", "elsewhere", "fit", "sigma", "longer_m", "shorter_m", "bearing"),
+    *("heading", "heading_sigma", "cell_id"),
+)
+CANDIDATE_NAMES = ("chance", "cell_chance", "distance", "loglik", "heading", "cell_id")
+REGION_NAMES = ("chance", "cells", "km2", "best_cell_id")
+LISTED_NAMES = ("chance", "distance", "types", "cell_id")
+OBJECT_NAMES = tuple(column.name for columns in OBJECT_FORM.values() for column in columns)
 REGION = {"color": CHANCES[0.9], "weight": 3, "opacity": 0.9, "fill": True, "fillOpacity": 0.25}
+# Meaning of each verdict on an object, and the style of its ray; the default colour is that of
+# `VERDICTS`.
+RAYS: dict[str, tuple[str, dict[str, object]]] = {
+    "matched": ("a street object", {"weight": 2, "opacity": 0.9, "dashArray": None}),
+    "misnamed": ("one of another class", {"weight": 2, "opacity": 0.9, "dashArray": "9 4"}),
+    "missed": (
+        "a street object not in the query",
+        {"color": "#808080", "weight": 1, "opacity": 0.9, "dashArray": "3 5"},
+    ),
+    "false": ("no street object", {"weight": 2, "opacity": 0.9, "dashArray": "3 5"}),
+    "outside": (
+        "a street object outside the photos",
+        {"weight": 1, "opacity": 0.5, "dashArray": "1 5"},
+    ),
+}
+CANDIDATE = "#ffffff"
+SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
+SURROUNDINGS_M = 45.0  # smallest distance that is shown around the answer
+CLOSEST_ZOOM = 20
+
+
+def location_map(
+    location: Location, *, map_: folium.Map | None = None, tiles: str | None = None
+) -> folium.Map:
+    """Show where a query may have been seen, and what supports each place.
+
+    Parameters
+    ----------
+    location : Location
+        What to show.
+    map_, tiles : optional
+        As in `evaluation_map`.
+
+    Returns
+    -------
+    folium.Map
+        The map, with these layers: images of the cells, of their chances, of the chances within
+        a radius, and of the fewest cells that contain 50, 90 and 99 % of the chance (the most
+        informative one is shown first); the candidates with their ranks, the best place with its
+        ellipse of 90 %, and for each explained candidate the rays of the query and the street
+        objects. A click shows the facts of each in the panel.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, locate, named_noise
+    >>> index = build_index(demo_database, named_noise("generic"))
+    >>> location_map(locate(index, demo_database.signature(0))).options["maxZoom"]
+    20
+    """
+    database, drawing = location.posterior.database, answer_drawing(location)
+    page = start_map(map_, tiles, title="Where it was seen")
+    near = location.answer.given
+    _colour_chances(page, location.posterior, radius=location.rule.radius, near=near)
+    explained = zip(location.explanations, drawing["candidates"], strict=False)
+    for number, (explanation, candidate) in enumerate(explained, start=1):
+        sectors = sector_outlines(location, explanation)
+        parts = _object_parts(candidate["rays"], {*explanation.counts}, sectors)
+        name = f"Objects from rank {number}"
+        add_layer(page, name, "drawings", parts, group="answer", show=number == 1)
+    cells = location.columns["cell"].tolist()
+    looks = [(CANDIDATE, 8, f"Rank {rank:,}", str(rank)) for rank in range(1, len(cells) + 1)]
+    _add_candidates(page, location, database, cells, looks)
+    place = _place_parts(location, drawing["estimate"])
+    add_layer(page, "Best place", "drawings", place, group="answer")
+    legend, view = location_legend(location), _corners(location) if map_ is None else None
+    return finish_map(page, database, legend=legend, view=view, zoom=CLOSEST_ZOOM)
+
+
+def posterior_map(
+    posterior: Posterior,
+    *,
+    radius: float = DEFAULT_RULE.radius,
+    map_: folium.Map | None = None,
+    tiles: str | None = None,
+) -> folium.Map:
+    """Show the chance of every cell, for an answer that was exported to a raster.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        What to show (see `open_posterior`).
+    radius : float, default 50
+        Radius in metres around a cell in which chances are summed for a second image.
+    map_, tiles : optional
+        As in `evaluation_map`.
+
+    Returns
+    -------
+    folium.Map
+        The map: the cells coloured as in `location_map`, and the cell with the largest chance
+        within the radius.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, locate, named_noise
+    >>> index = build_index(demo_database, named_noise("generic"))
+    >>> location = locate(index, demo_database.signature(0))
+    >>> posterior_map(location.posterior).options["maxZoom"]
+    20
+    """
+    database = posterior.database
+    page = start_map(map_, tiles, title="Where it was seen")
+    _colour_chances(page, posterior, radius=radius, near=False)
+    cell, mass = posterior.best_place(radius)
+    (place,) = exact_latlon(database.xy[cell], database.crs)
+    row = {"place": place, "chance": mass, "within_m": radius, "cell_id": database.cell_ids[cell]}
+    name, signs = "Best place", panel_signs(database)
+    point = described_points(
+        [row],
+        PLACE_FORM,
+        tuple(row)[1:],
+        [(CANDIDATE, 8, name, "1")],
+        wheels=[("Cell sees", [cell_signature(database, cell, place=place)])],
+        signs=signs,
+    )
+    add_layer(page, name, *point, group="answer")
+    legend = (
+        "<summary>Where it was seen</summary>"
+        f"<p>{len(database):,} cells; the largest chance around one: {percent(mass)} within "
+        f"{radius:g} m</p>{_chances_legend(posterior)}{shades_part()}"
+        f"{credits_part(database.licenses)}"
+    )
+    view = corners_of(database) if map_ is None else None
+    return finish_map(page, database, legend=legend, view=view)
+
+
+def _colour_chances(map_: folium.Map, posterior: Posterior, *, radius: float, near: bool) -> None:
+    """Add images of chances and regions; show chances of cells if `near`, else within a radius."""
+    city = add_city(map_, posterior.database)
+    around, cell = posterior.mass_within(radius), posterior.chances
+    regions = _image(posterior, region_levels(posterior), REGION_COLOURS)
+    for name, picture, show in (
+        (f"Chance within {radius:g} m", _chances(posterior, around), not near),
+        ("Chance of a cell", _chances(posterior, cell), near),
+        ("Regions of 50, 90 and 99 %", regions, False),
+    ):
+        image = cell_image(map_, *picture, dark="flip", opacity=0.85)
+        colour_cells(map_, name, city, image, show=show)
+
+
+def _chances(posterior: Posterior, chances: NDArray[np.float64]) -> Image:
+    """Return an image of one chance per cell."""
+    levels = np.digitize(chances, list(CELL_CHANCES))
+    return _image(posterior, levels, list(CELL_CHANCES.values()))
+
+
+def _image(posterior: Posterior, levels: NDArray[np.integer], colours: list[str]) -> Image:
+    """Return an image of the cells with a level above 0 and of the likeliest cell."""
+    cells = np.union1d(np.flatnonzero(levels), [int(posterior.chances.argmax())])
+    return level_image(posterior.database.select(cells), levels[cells].astype(np.uint8), colours)
+
+
+def _corners(location: Location) -> NDArray[np.float64]:
+    """Return the corners of the first view: around the answer, or all candidates without one."""
+    place = location.estimate
+    middle = np.array([[place.x, place.y]])
+    if location.answer.given:
+        around = max(SURROUNDINGS_M, 1.5 * place.ellipse()[0])
+        corners = np.concatenate([middle - around, middle + around])
+    else:
+        corners = np.concatenate([middle, _viewpoints(location)])
+    return to_latlon(corners, location.crs)
+
+
+def _viewpoints(answer: Answer) -> NDArray[np.float64]:
+    """Return the viewpoints of the candidates in metres, shape (n, 2)."""
+    return np.stack([answer.columns["x"], answer.columns["y"]], axis=1)
+
+
+def _place_parts(location: Location, estimate: Mapping[str, Any]) -> list[list[Any]]:
+    """Return the drawing of the best place and its ellipse."""
+    row = place_row(location) | {"place": estimate["place"]}
+    name = "The answer" if location.answer.given else "Cannot tell: the best place"
+    mark = ANSWERS[row["answer"]]
+    outline = {"color": mark.colour, "weight": 3, "opacity": 0.9}
+    looks, shape = [(mark.colour, 6, name)], OUTLINES[mark.shape]
+    return [
+        ["lines", [[outline, [estimate["ellipse"]]]]],
+        described_points([row], PLACE_FORM, PLACE_NAMES, looks, outline=shape),
+    ]
+
+
+def _object_parts(
+    rays: Sequence[Mapping[str, Any]], counted: Collection[str], sectors: list[list[list[float]]]
+) -> list[list[Any]]:
+    """Return the drawing of the rays of a candidate, the street objects and the photo sectors."""
+    lines: list[list[Any]] = []
+    for verdict, (_, look) in RAYS.items():
+        ends = [[ray["from"], ray["to"]] for ray in rays if ray["verdict"] == verdict]
+        if ends or verdict in counted:
+            lines.append([{"color": VERDICTS[verdict], **look}, ends])
+    if sectors:
+        lines.append([SECTOR, sectors])
+    # The signs keep their order: that of the query, then that of the other street objects.
+    rows = [{**ray, "place": ray["sign"]} for ray in reversed(rays)]
+    looks = [(VERDICTS[row["verdict"]], 6, row["verdict"].capitalize()) for row in rows]
+    return [["lines", lines], described_points(rows, OBJECT_FORM, OBJECT_NAMES, looks)]
+
+
+def _add_candidates(
+    map_: folium.Map,
+    answer: Answer,
+    database: SignatureDatabase,
+    cells: Sequence[int],
+    looks: Sequence[Sequence[Any]],
+) -> None:
+    """Add the candidates; `cells` are their rows in the database."""
+    query, spec = answer.grid_query, database.spec
+    places = exact_latlon(_viewpoints(answer), database.crs)
+    rows = [
+        {**row, "place": place} for row, place in zip(answer.candidate_rows(), places, strict=True)
+    ]
+    turns = [row.get("heading") or 0.0 for row in rows]
+    asked = [
+        query_signature(query, database.taxonomy, radius=spec.radius, place=place, turn=turn)
+        for place, turn in zip(places, turns, strict=True)
+    ]
+    there = [
+        cell_signature(database, cell, query, turn, place=place)
+        for cell, place, turn in zip(cells, places, turns, strict=True)
+    ]
+    points = described_points(
+        rows,
+        CANDIDATE_FORM,
+        [name for name in CANDIDATE_NAMES if name in rows[0]],
+        looks,
+        wheels=[("Query", asked), ("Cell sees", there)],
+        signs=panel_signs(database),
+    )
+    add_layer(map_, f"Candidates ({len(rows):,})", *points, group="answer")
+
+
+def location_legend(location: Location) -> str:
+    """Return the legend of `location_map` as HTML with data escaped."""
+    posterior = location.posterior
+    mark = ANSWERS["given" if location.answer.given else "withheld"]
+    # The counted verdicts always, others only where they occur.
+    verdicts = {row["verdict"] for item in location.explanations for row in item.rows}
+    kinds = "".join(
+        f"<br>{swatch(VERDICTS[kind])}{kind}: {text}"
+        for kind, (text, _) in RAYS.items()
+        if kind in verdicts or kind in COUNTED
+    )
+    rays = f"<p>Objects of the query, as rays where they were seen{kinds}</p>"
+    name = "The answer" if location.answer.given else "The best place"
+    method = f"Likelihood, {escaped_text(location.noise)} noise, {len(posterior.database):,} cells"
+    return _answer_legend(
+        location,
+        "Where it was seen",
+        f"<p>{mark_svg(mark)} <b>{name}</b>, ellipse: 90 %<br>{method_text(method)}</p>",
+        place_sentences(location),
+        f"{_chances_legend(posterior)}"
+        f"{layer_part('Candidates', f'<p>{swatch(CANDIDATE)}Candidates by rank</p>')}"
+        f"{layer_part('Objects from rank ', rays) if location.explanations else ''}",
+    )
+
+
+def _answer_legend(
+    answer: Answer, title: str, head: str, sentences: Iterable[str], parts: str
+) -> str:
+    """Return a legend as HTML: sentences on the answer, parts for its layers, and its query."""
+    texts = "".join(
+        f"<p>{escaped_text(sentence)}</p>"
+        for sentence in (*sentences, *north_sentences(answer), *note_sentences(answer))
+    )
+    query = "".join(f"<p>{escaped_text(sentence)}</p>" for sentence in query_sentences(answer))
+    return (
+        f"<summary>{title}</summary>{head}{texts}{parts}{shades_part()}"
+        f"{folded_part('The query', query)}{credits_part(answer.licenses)}"
+    )
+
+
+def _chances_legend(posterior: Posterior) -> str:
+    """Return the legend of the images of chances and of regions, as HTML."""
+    counts = {share: len(posterior.credible_cells(share)) for share in CHANCES}
+    regions = "<br>".join(
+        f"{swatch(CHANCES[share], FLIPPING)}{percent(share, 0)} in {count:,} "
+        f"cell{'s' * (count != 1)}"
+        for share, count in counts.items()
+    )
+    chances = " ".join(
+        f"<span style='white-space:nowrap'>{swatch(shade, FLIPPING)}{100.0 * least:g}+</span>"
+        for least, shade in sorted(CELL_CHANCES.items(), reverse=True)
+    )
+    return layer_part("Chance ", f"<p>Chance in percent<br>{chances}</p>") + layer_part(
+        "Regions ", f"<p>Regions, the fewest cells that contain<br>{regions}</p>"
+    )
+
+
+def localization_map(
+    localization: Localization,
+    database: SignatureDatabase,
+    *,
+    map_: folium.Map | None = None,
+    tiles: str | None = None,
+) -> folium.Map:
+    """Show the candidate cells of a query, the best ones first.
+
+    Parameters
+    ----------
+    localization : Localization
+        What to show.
+    database : SignatureDatabase
+        The database that was searched.
+    map_, tiles : optional
+        As in `evaluation_map`.
+
+    Returns
+    -------
+    folium.Map
+        The map: the cells as an image, and the candidates, coloured by their distance to the
+        query and described by a click. The best candidates are larger.
+
+    Raises
+    ------
+    InputError
+        If the localization is from another database, or as in `evaluation_map`.
+
+    Examples
+    --------
+    >>> from semsig_gis import localize
+    >>> localization = localize(demo_database, demo_database.signature(0), method="edit+edit")
+    >>> localization_map(localization, demo_database).options["maxZoom"]
+    20
+    """
+    columns = localization.columns
+    ids, types = columns["cell_id"], columns["types"]
+    cells = rows_of_result(database, ids, types, what="localization")
+    # Colours are scaled to the range of distances, which is 0 for equal candidates.
+    away = columns["distance"] - columns["distance"].min()
+    colours = mixed(away / (away.max() or 1.0), CANDIDATE_RAMP)
+    low, high, tied = (columns[name].tolist() for name in ("rank_low", "rank_high", "tied"))
+    looks = [
+        (colour, 9 if first == 1 else 6, f"Rank {ranks_text(first, last)}{ties_text(ties)}")
+        for colour, first, last, ties in zip(colours, low, high, tied, strict=True)
+    ]
+    page = start_map(map_, tiles, title="Candidate places")
+    add_city(page, database)
+    _add_candidates(page, localization, database, cells.tolist(), looks)
+    legend = localization_legend(localization)
+    view = to_latlon(_viewpoints(localization), database.crs) if map_ is None else None
+    return finish_map(page, database, legend=legend, view=view)
+
+
+def localization_legend(localization: Localization) -> str:
+    """Return the legend of `localization_map` as HTML with data escaped."""
+    distances = localization.columns["distance"]
+    method = f"{escaped_text(str(localization.method))}, by {escaped_text(localization.used)}"
+    ramp = ramp_bar(CANDIDATE_RAMP, f"{distances.min():.3f}", f"{distances.max():.3f}")
+    return _answer_legend(
+        localization,
+        "Candidate places",
+        f"<p>The best <b>{len(distances):,}</b> of {localization.cells:,} cells<br>"
+        f"{method_text(method)}</p>",
+        tie_sentences(localization),
+        layer_part("Candidates", f"<p>Distance to the query (large sign: rank 1){ramp}</p>"),
+    )
 
 
 def answer_map(
@@ -56,16 +475,15 @@ def answer_map(
     page = start_map(map_, tiles, title="Where it was seen")
     add_city(page, database)
     regions, candidates = shapes[polygons], shapes[~polygons]
-    regions = regions.assign(cell_id=regions["best_cell_id"])
     rings = shapely.get_rings(regions.geometry.array)
     lines = [exact_latlon(shapely.get_coordinates(ring), database.crs) for ring in rings]
-    middles = regions.geometry.representative_point()
-    parts = [["lines", [[REGION, lines]]], _points("Region", regions, middles, CHANCES[0.9])]
+    middles = regions.set_geometry(regions.geometry.representative_point())
+    signs = _ranked_points("Region", middles, REGION_FORM, REGION_NAMES, CHANCES[0.9])
+    parts = [["lines", [[REGION, lines]]], signs]
     add_layer(page, f"Regions to search ({len(regions):,})", "drawings", parts, group="answer")
     if len(candidates):
-        points = _points("Candidate", candidates, candidates.geometry, CANDIDATE)
-        name = f"Candidates ({len(candidates):,})"
-        add_layer(page, name, "drawings", [points], group="answer")
+        points = _ranked_points("Rank", candidates, CANDIDATE_FORM, LISTED_NAMES, CANDIDATE)
+        add_layer(page, f"Candidates ({len(candidates):,})", *points, group="answer")
     legend = (
         "<summary>Where it was seen</summary>"
         f"<p>{swatch(CHANCES[0.9])}Regions to search: {len(regions):,}"
@@ -104,22 +522,17 @@ def _shapes(path: Path, database: SignatureDatabase) -> gpd.GeoDataFrame:
     return shapes
 
 
-def _points(name: str, rows: gpd.GeoDataFrame, places: gpd.GeoSeries, colour: str) -> list[Any]:
-    """Return the drawing of rows as numbered signs, the best last so that it lies on top."""
-    latlon = exact_latlon(shapely.get_coordinates(places.array), rows.crs)
-    records = []
-    for place, row in zip(latlon, rows.to_dict("records"), strict=True):
-        rank = int(row["rank"])
-        details = [_text(column, row.get(column)) for column in COLUMNS]
-        records.append([place, colour, 8, f"{name} {rank:,}", details, str(rank)])
-    return ["points", FIELDS, {}, records[::-1]]
-
-
-def _text(column: str, value: Any) -> str | None:  # noqa: ANN401 - any type of a file column
-    if pd.isna(value) or value == "":
-        return None
-    if column == "types":
-        return str(value)
-    number = float(value)  # KML and CSV contain texts
-    texts = {"chance": percent(number), "km2": f"{number:.4g}"}
-    return texts.get(column, f"{number:.0f}")
+def _ranked_points(
+    kind: str, frame: gpd.GeoDataFrame, form: Form, names: Sequence[str], colour: str
+) -> list[Any]:
+    """Return the drawing of the rows of a file as signs with their ranks."""
+    places = exact_latlon(shapely.get_coordinates(frame.geometry.array), frame.crs)
+    # KML contains numbers as text.
+    numeric = [name for name in names if name in frame and name != "types"]
+    table = frame.assign(**{name: pd.to_numeric(frame[name]) for name in numeric})
+    rows = [
+        {**row, "place": place} for row, place in zip(table.to_dict("records"), places, strict=True)
+    ]
+    ranks = [int(row["rank"]) for row in rows]
+    looks = [(colour, 8, f"{kind} {rank:,}", str(rank)) for rank in ranks]
+    return described_points(rows, form, [name for name in names if name in frame], looks)

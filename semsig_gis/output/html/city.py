@@ -6,11 +6,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from semsig_gis.core import InputError
-from semsig_gis.output.html.answer import answer_map
+from semsig_gis.output.html.answer import answer_map, posterior_map
 from semsig_gis.output.html.cells import ambiguity_map, identifiability_map
 from semsig_gis.output.html.drift import drift_map
 from semsig_gis.output.html.evaluation import evaluation_map
-from semsig_gis.output.html.location import posterior_map
 from semsig_gis.output.html.objects import objects_map
 from semsig_gis.output.html.page_elements import cell_colours
 

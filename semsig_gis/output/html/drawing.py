@@ -10,11 +10,15 @@ from semsig_gis.core import CHANCES
 from semsig_gis.localization import UNKNOWN_NAME
 from semsig_gis.observation import View
 from semsig_gis.output.html.page_elements import exact_latlon
+from semsig_gis.output.layers.columns import described
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
     from numpy.typing import NDArray
 
     from semsig_gis.localization import Explanation, Location, Posterior
+    from semsig_gis.output.layers.columns import Form
 
 REGION_COLOURS = [CHANCES[share] for share in sorted(CHANCES, reverse=True)]
 ARC_POINTS = 72  # of the outline of a sector
@@ -107,6 +111,37 @@ def _rays(location: Location, explanation: Explanation) -> list[dict[str, Any]]:
         }
         for number, row in enumerate(rows)
     ]
+
+
+def described_points(
+    rows: Iterable[Mapping[str, Any]],
+    form: Form,
+    names: Sequence[str],
+    looks: Iterable[Sequence[Any]],
+    *,
+    wheels: Sequence[tuple[str, Sequence[Any]]] = (),
+    signs: Mapping[str, Any] | None = None,
+    outline: str | None = None,
+) -> list[Any]:
+    """Return the drawing of rows as signs; the panel shows the columns in `names` and the place.
+
+    A row has its ``place`` in degrees. `looks` are the colour, the size, the name and perhaps the
+    label of each sign, `wheels` titles with a signature for each row. The last row is drawn first,
+    so that the best lies on top.
+    """
+    columns = described(names, form, {})
+    records = []
+    for number, (row, (colour, size, name, *label)) in enumerate(zip(rows, looks, strict=True)):
+        lat, lon = row["place"]
+        details = [
+            *(signatures[number] for _, signatures in wheels),
+            *(column.text(row.get(column.name)) for column in columns),
+            f"{lat:.6f}, {lon:.6f}",
+        ]
+        records.append([row["place"], colour, size, name, details, *label])
+    fields = [*(title for title, _ in wheels), *(column.title for column in columns), "Place"]
+    drawing = ["points", fields, signs or {}, records[::-1]]
+    return drawing if outline is None else [*drawing, outline]
 
 
 def sector_outlines(location: Location, explanation: Explanation) -> list[list[list[float]]]:

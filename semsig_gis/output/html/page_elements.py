@@ -20,7 +20,6 @@ from folium.utilities import JsCode
 
 from semsig_gis import __version__
 from semsig_gis.core import (
-    FULL_TURN,
     VERDICTS,
     InputError,
     across_180,
@@ -518,24 +517,6 @@ def mark_svg(mark: Mark) -> str:
 def escaped_text(text: str) -> str:
     """Return text from data as HTML; its text direction does not change the text around it."""
     return f"<bdi>{escape(text)}</bdi>"
-
-
-def query_text(query: Signature, taxonomy: Taxonomy) -> str:
-    """Return types, bearings, ranges and sectors of a query as HTML, one line each."""
-    lines = []
-    if query.codes is not None:
-        lines.append(f"Types: {escape(taxonomy.decode(query.codes))}<br>")
-    if query.bearings is not None:
-        degrees = (round(bearing) % 360 for bearing in query.bearings.tolist())
-        lines.append(f"Bearings: {' '.join(f'{value}°' for value in degrees)}<br>")
-    if isinstance(query, View):
-        if query.ranges is not None:
-            ranges = ("?" if m is None else f"{m} m" for m in _whole_metres(query.ranges))
-            lines.append(f"Ranges: {', '.join(ranges)}<br>")
-        if all(photo.sectors for photo in query.photos):
-            edges = (f"{low:.0f}-{high % FULL_TURN:.0f}°" for low, high in _sectors(query.photos))
-            lines.append(f"Looked at: {', '.join(edges)}<br>")
-    return "".join(lines)
 
 
 def swatch(colour: str, shape: str = "round") -> str:

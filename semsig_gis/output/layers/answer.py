@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.database import CellTable
+from semsig_gis.localization import Location
 from semsig_gis.output.layers.columns import form_of
 from semsig_gis.output.layers.model import Display, table_layer
 from semsig_gis.output.layers.styles import by_answer, by_rank
@@ -33,6 +34,9 @@ y = ["North", "In the coordinate system of the layer.", "m", 2]
 lon = ["Longitude", "WGS 84.", "°", 7]
 lat = ["Latitude", "WGS 84.", "°", 7]
 sigma = ["Standard deviation", "Of the place in either direction, if it is right.", "m", 1]
+longer_m = ["Ellipse, longer", "Half axis of the ellipse of 90 %, if the place is right.", "m", 1]
+shorter_m = ["Ellipse, shorter", "The other half axis.", "m", 1]
+bearing = ["Bearing of the ellipse", "Of its longer axis, clockwise from grid north.", "°", 0]
 heading = ["Heading", "What is added to the bearings of the query to have them from north.", "°", 1]
 heading_sigma = ["Standard deviation of the heading", "Of the heading.", "°", 1]
 cell_id = ["Cell", "Number of the cell in the grid."]
@@ -74,6 +78,20 @@ searched_km2 = ["Area up to here", "Of this region and all before it.", "km²", 
 searched_percent = ["Share of the city up to here", "Of the area of all cells.", "%", 3]
 """)  # noqa: E501
 
+OBJECT_FORM = form_of("""
+[Object]
+chance = ["Chance", "Of the verdict being right, from 0 to 1.", "1", 2]
+seen_title = ["Seen as", "Class of the object of the query."]
+seen_bearing = ["Bearing seen", "From the candidate, clockwise from grid north.", "°", 1]
+seen_range = ["Distance seen", "From the candidate.", "m", 1]
+object_title = ["Street object", "Class of the street object."]
+bearing = ["Bearing", "Of the street object.", "°", 1]
+distance = ["Distance", "Of the street object.", "m", 1]
+bearing_error = ["Off by", "From the bearing of the street object to that seen, clockwise.", "°", 1]
+source = ["Source", "Of the street object."]
+source_id = ["Identifier", "Of the street object in its source."]
+""")
+
 GROUP = "Answer"
 # A candidate of the likelihood method has one rank, others may be tied.
 RANK = "coalesce(attribute('rank'), attribute('rank_low'))"
@@ -91,7 +109,7 @@ def answer_layers(
     columns = cells.columns(slice(0, len(candidates)))
     candidates = candidates.assign(bearings=columns["bearings"], distances=columns["distances"])
     values: Mapping[str, Any] = answer.to_dict()
-    licenses, place = tuple(values["licenses"]), values.get("place")
+    licenses = tuple(values["licenses"])
     facts = {name: values[name] for name in values if name not in {"candidates", "crs", "licenses"}}
     facts["searched"] = regions.to_dict()
     layer = functools.partial(
@@ -135,12 +153,10 @@ def answer_layers(
             styles=(by_rank(str(answer.candidates.columns[0]), geometry="point"),),
         ),
     ]
-    if place is None:
+    if not isinstance(answer, Location):
         return layers
-    row: dict[str, Any] = {"answer": "given" if facts["answered"] else "withheld"}
-    row |= {name: value for name, value in place.items() if isinstance(value, (bool, int, float))}
-    row |= {name: np.nan if facts[name] is None else facts[name] for name in ("elsewhere", "fit")}
-    points = gpd.points_from_xy([place["x"]], [place["y"]])
+    row = place_row(answer)
+    points = gpd.points_from_xy([row["x"]], [row["y"]])
     estimate = layer(
         gpd.GeoDataFrame(pd.DataFrame([row]), geometry=points, crs=answer.crs),
         name="place",
@@ -157,3 +173,20 @@ def answer_layers(
         styles=(by_answer(),),
     )
     return [*layers, estimate]
+
+
+def place_row(location: Location) -> dict[str, Any]:
+    """Return the columns of the place of an answer by likelihood; missing numbers are NaN."""
+    facts = location.to_dict()
+    place = {name: value for name, value in facts["place"].items() if name != "covariance"}
+    ellipse = place.pop("ellipse_90")
+    row = {
+        "answer": "given" if facts["answered"] else "withheld",
+        **place,
+        "longer_m": ellipse["longer"],
+        "shorter_m": ellipse["shorter"],
+        "bearing": ellipse["bearing"],
+        "elsewhere": facts["elsewhere"],
+        "fit": facts["fit"],
+    }
+    return {name: np.nan if value is None else value for name, value in row.items()}

@@ -7,9 +7,9 @@ import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import one_lines
+from semsig_gis.core import one_lines, percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -36,6 +36,17 @@ class Column:
     def alias(self) -> str:
         """Title with the unit."""
         return f"{self.title} ({self.unit})" if self.unit not in {"", "1"} else self.title
+
+    def text(self, value: Any) -> str | None:  # noqa: ANN401 - any value of a table
+        """Return a value with its unit, a chance in percent; None if it is missing."""
+        if value is None or value != value or value == "":  # noqa: PLR0124 - NaN
+            return None
+        if self.unit == "1":
+            return percent(float(value))
+        if self.decimals is None:
+            # Integers become floats in a file and in a column with missing values.
+            return f"{value:.0f}" if isinstance(value, float) else str(value)
+        return f"{value:,.{self.decimals}f}{'' if self.unit == '°' else ' '}{self.unit}".rstrip()
 
 
 # Columns of a layer by tab of its form.

@@ -62,13 +62,9 @@ def answer_tables(answer: Location | Localization) -> Iterator[Table | str]:
         title = f"{len(ranks)} best of {cells}, by {answer.used}"
         distances = map(figure, columns["distance"].tolist())
         yield _candidate_table(answer, title, ranks, distance=distances)
-        if tied := answer.tied_beyond:
-            more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
-            yield f"{more} with the last one."
+        yield from tie_sentences(answer)
     yield from query_sentences(answer)
-    if answer.north != GRID_NORTH:
-        turn = answer.north.turn % 360.0
-        yield f"Bearings are measured from {answer.north}, at {turn:.1f}° from grid north."
+    yield from north_sentences(answer)
     yield from note_sentences(answer)
 
 
@@ -240,6 +236,20 @@ def query_sentences(answer: Answer) -> Iterator[str]:
     for name, label in (("seen", "Seen somewhere"), ("absent", "Not there")):
         if titles := knowledge.get(name):
             yield f"{label}: {', '.join(titles)}."
+
+
+def tie_sentences(answer: Localization) -> Iterator[str]:
+    """Yield the number of cells that tie with the last candidate, if there are any."""
+    if tied := answer.tied_beyond:
+        more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
+        yield f"{more} with the last one."
+
+
+def north_sentences(answer: Answer) -> Iterator[str]:
+    """Yield the north of the query, unless it is grid north."""
+    if answer.north != GRID_NORTH:
+        turn = answer.north.turn % 360.0
+        yield f"Bearings are measured from {answer.north}, at {turn:.1f}° from grid north."
 
 
 def note_sentences(*answers: Answer) -> Iterator[str]:

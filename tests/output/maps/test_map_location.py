@@ -53,7 +53,8 @@ def test_location_map_has_layers_legend_and_signs(page: MapPage) -> None:
     numbers = [str(element.get_property("textContent")) for element in page.all(".semsig-number")]
     assert sorted(numbers) == ["1", "2", "3", "4", "5"]
     legend = page.text(LEGEND)
-    assert "The answer: over 99 % within 50 m" in legend
+    assert "The answer, ellipse: 90 %" in legend
+    assert "within 50 m of it: chance over 99 %." in legend
     assert "90 % in" in legend
     assert "matched: a street object" in legend
     assert page.circles(ANSWERS["given"].colour) == 1
@@ -90,8 +91,8 @@ def test_clicks_describe_places_and_objects(page: MapPage) -> None:
     page.point_at("circles(arguments[0])[0]", ANSWERS["given"].colour)
     text = page.panel()
     assert text.startswith("The answer")
-    assert f"{percent(location.answer.mass)} within 50 m" in text
-    assert f"± {location.estimate.heading_sigma:.1f}°" in text
+    assert f"Chance\t{percent(location.answer.mass)}" in text
+    assert f"Standard deviation of the heading\t{location.estimate.heading_sigma:.1f}°" in text
     text = page.panel_of(VERDICTS["matched"])
     rows: list[Any] = location.explanations[0].to_dict()["rows"]
     matched = next(row for row in rows if row["verdict"] == "matched")
@@ -109,7 +110,7 @@ def test_wheels_show_sectors_and_distances_of_a_view(page: MapPage) -> None:
     outside = ~photo.sees(BEARINGS)
     assert 0 < outside.sum() < len(view)
     page.open(localization_map(localize(CITY, view, top=1, method=Method()), CITY))
-    assert "Looked at: " in page.text(LEGEND)
+    assert "; looked at " in page.text(LEGEND)
     page.ask("shown((layer) => layer instanceof L.CircleMarker)[0].fire('click')")
     assert page.panel()
     query, cell = page.all(".semsig-wheels figure")
@@ -148,7 +149,8 @@ def test_withheld_answer_shows_all_candidates(page: MapPage) -> None:
     assert not location.answer.given
     page.open(location_map(location))
     legend = page.text(LEGEND)
-    assert f"Cannot tell{location.region_text}The best place: " in legend
+    assert f"Cannot tell. {location.region_text}." in legend
+    assert "Best place: " in legend
     assert "The view may" not in legend
     assert "matched" not in legend
     assert page.circles(ANSWERS["withheld"].colour) == 1
@@ -166,7 +168,6 @@ def test_localization_map_describes_candidates(page: MapPage) -> None:
     assert len(descriptions) == 50
     best = descriptions[-1]  # drawn last, on top
     assert best.startswith("Rank 1")
-    assert "Rank\t1 of " in best
     assert str(CITY.cell_ids[LONGEST]) in best
     assert CITY.types(LONGEST) in best
     # The query and what the cell sees, side by side.
@@ -174,7 +175,7 @@ def test_localization_map_describes_candidates(page: MapPage) -> None:
     captions = [element.get_property("innerText") for element in page.all("figcaption")]
     assert captions == ["Query", "Cell sees, to 30 m"]
     page.ask("semsig.hide(map)")
-    assert f"Types: {CITY.types(LONGEST)}" in page.text(LEGEND)
+    assert "Seen: " in page.text(LEGEND)
     page.switch("Candidates")
     assert page.ask(texts) == []
 
