@@ -34,7 +34,6 @@ from semsig_gis.output.layers.styles import AMBIGUITY, CHANCES, IDENTIFIABILITY,
 with extra("plot", "a report or a figure"):
     from matplotlib.colors import LinearSegmentedColormap, ListedColormap
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Ellipse
     from matplotlib.ticker import MaxNLocator
     from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
@@ -125,7 +124,7 @@ def plot_database(
         title = CELL_COLUMNS[name].title
         if not COLOUR_OPTIONS & look.keys():
             axes = map_axes(ax)
-            _draw_steps(axes, database, values, CELL_COLUMNS[name], legend=legend, **look)
+            _draw_scale(axes, database, values, CELL_COLUMNS[name], legend=legend, **look)
             axes.set_title(f"{len(database):,} cells, by {title}")
             _frame(axes)
             return axes
@@ -379,20 +378,15 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     database, place = location.posterior.database, location.estimate
     axes = map_axes(ax)
     _draw_cells(axes, database, np.ones(len(database)), cmap=ListedColormap([CELL_GROUND]))
-    chances = np.where(CHANCES.levels(location.chances), location.chances, np.nan)
-    _draw_steps(axes, database, chances, CHANCES, legend=legend)
+    _draw_scale(axes, database, location.chances, CHANCES, legend=legend)
     # Dots make single cells visible at small scales; the most probable are drawn last, on top.
-    cells = location.region[~np.isnan(chances[location.region])][::-1]
-    colours = np.array(CHANCES.colours)[CHANCES.levels(chances[cells]) - 1]
+    levels = CHANCES.levels(location.chances)
+    cells = location.region[levels[location.region] > 0][::-1]
     x, y = database.xy[cells].T
+    colours = np.array(CHANCES.colours)[levels[cells] - 1]
     axes.scatter(x, y, c=colours, s=DOT, linewidths=0, marker="s", zorder=2)
     mark = ANSWERS["given" if location.answer.given else "withheld"]
-    longer, shorter, bearing = place.ellipse()
-    # matplotlib measures the angle of an ellipse counter-clockwise from the east.
-    size: dict[str, Any] = {"width": 2 * shorter, "height": 2 * longer, "angle": -bearing}
-    axes.add_patch(
-        Ellipse((place.x, place.y), **size, fill=False, edgecolor=mark.colour, linewidth=1.5)
-    )
+    axes.plot(*place.outline().T, color=mark.colour, linewidth=1.5)
     axes.plot(place.x, place.y, **_place_marker(mark))
     # The map shows the region and the place, with a margin.
     region = np.vstack([database.xy[location.region], [[place.x, place.y]]])
@@ -416,7 +410,7 @@ def _place_marker(mark: Mark) -> dict[str, Any]:
     return {"linestyle": "", "marker": marker, "markersize": 16 * share, "zorder": 4, **edge}
 
 
-def _draw_steps(
+def _draw_scale(
     axes: Axes,
     database: SignatureDatabase,
     values: NDArray[np.float64],
@@ -425,11 +419,10 @@ def _draw_steps(
     legend: bool,
     **look: Any,  # noqa: ANN401 - whatever matplotlib takes
 ) -> None:
-    """Draw numbers of cells in the colours of their ranges."""
-    levels = np.where(np.isnan(values), np.nan, scale.levels(values) - 1.0)
+    """Draw numbers of cells in the colours of their classes."""
+    levels = np.where(scale.levels(values) > 0, scale.levels(values) - 1.0, np.nan)
     ends = {"vmin": -0.5, "vmax": len(scale.colours) - 0.5}
-    colours = {"cmap": ListedColormap(scale.colours), **ends}
-    image = _draw_cells(axes, database, levels, **colours, **look)
+    image = _draw_cells(axes, database, levels, cmap=ListedColormap(scale.colours), **ends, **look)
     if legend:
         bar = _add_colour_bar(axes, image, scale.title)
         bar.set_ticks(range(len(scale.labels)), labels=scale.labels)

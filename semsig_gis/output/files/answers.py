@@ -11,9 +11,8 @@ import pyarrow as pa
 import pyogrio
 import shapely
 
-from semsig_gis.core import ANSWERS, GEOMETRY, one_line
+from semsig_gis.core import GEOMETRY, one_line
 from semsig_gis.output.features import geojson_options, write_errors
-from semsig_gis.output.layers.styles import RANKS
 from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
@@ -65,8 +64,8 @@ def write_answer_kml(layers: Sequence[Layer], path: str | Path) -> None:
     document = ET.SubElement(root, "Document")
     _add_text(document, "name", TITLE)
     _add_text(document, "description", "\n".join(map(one_line, layers[0].licenses)))
-    marks = (mark.colour for mark in ANSWERS.values())
-    for colour in [*RANKS.colours, *marks]:
+    classes = [item for layer in layers for item in layer.styles[0].classes]
+    for colour in dict.fromkeys(item.symbol.colour for item in classes):
         _add_style(document, colour)
     tables = [layer.read(slice(0, layer.rows)).to_pandas() for layer in layers]
     # All schemas precede the folders that use them. The integers of KML are too short for the ids
@@ -84,7 +83,7 @@ def write_answer_kml(layers: Sequence[Layer], path: str | Path) -> None:
         shapes = gpd.GeoSeries.from_wkb(table.pop(GEOMETRY), crs=layer.crs).to_crs("EPSG:4326")
         names = _names(layer, table.iloc[:, 0])
         for name, row, shape in zip(names, table.to_dict("records"), shapes, strict=True):
-            _add_place(folder, layer.name, name, row, shape)
+            _add_place(folder, layer, name, row, shape)
     ET.indent(root)
     with whole_file(path) as partial:
         ET.ElementTree(root).write(partial, encoding="utf-8", xml_declaration=True)
@@ -111,17 +110,16 @@ def _add_style(document: ET.Element, colour: str) -> None:
 
 
 def _add_place(
-    folder: ET.Element, layer: str, name: str, row: Mapping[Hashable, Any], shape: BaseGeometry
+    folder: ET.Element, layer: Layer, name: str, row: Mapping[Hashable, Any], shape: BaseGeometry
 ) -> None:
     """Add a row of a layer: its name, colour, columns and shape."""
     place = ET.SubElement(folder, "Placemark")
     _add_text(place, "name", name)
-    # The first column is the answer's verdict or a rank, and decides the colour.
-    key = str(next(iter(row.values())))
-    ranked = key not in ANSWERS
-    colour = RANKS.colours[RANKS.levels(float(key)) - 1] if ranked else ANSWERS[key].colour
-    _add_text(place, "styleUrl", f"#c{colour[1:]}")
-    data = ET.SubElement(ET.SubElement(place, "ExtendedData"), "SchemaData", schemaUrl=f"#{layer}")
+    style = layer.styles[0]
+    if (item := style.class_of(row[style.column])) is not None:
+        _add_text(place, "styleUrl", f"#c{item.symbol.colour[1:]}")
+    extended = ET.SubElement(place, "ExtendedData")
+    data = ET.SubElement(extended, "SchemaData", schemaUrl=f"#{layer.name}")
     for column, value in row.items():
         if not pd.isna(value):
             content = int(value) if isinstance(value, bool) else value  # as GDAL reads it
