@@ -201,6 +201,12 @@ class Location(Answer):
         return int(cell_ids(*self.posterior.database.grid.cells_at(estimate))[0])
 
     @property
+    def degrees(self) -> tuple[float, float]:
+        """Longitude and latitude of the estimated place, rounded to 1 cm."""
+        lon, lat = to_degrees(self.crs).transform(self.estimate.x, self.estimate.y)
+        return round(lon, 7), round(lat, 7)
+
+    @property
     def chances(self) -> NDArray[np.float64]:
         """The chance of every cell."""
         return self.posterior.chances
@@ -228,7 +234,7 @@ class Location(Answer):
         ``explanation``, with bearings from ``north`` like those of the query. ``prior`` has the
         keys of `known` and ``ratio``; it is None without a prior.
         """
-        lon, lat = to_degrees(self.crs).transform(self.estimate.x, self.estimate.y)
+        lon, lat = self.degrees
         candidates = self.candidate_rows()
         for candidate, why in zip(candidates, self.explanations, strict=False):
             candidate["explanation"] = why.to_dict(self.north)
@@ -243,8 +249,8 @@ class Location(Answer):
             "place": {
                 "cell_id": self.cell_id,
                 **self.estimate.to_dict(),
-                "lon": round(lon, 7),
-                "lat": round(lat, 7),
+                "lon": lon,
+                "lat": lat,
                 "chance": self.answer.mass,
                 "within_m": self.rule.radius,
             },

@@ -75,7 +75,7 @@ from semsig_gis.output.tables.answer import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     import folium
     from numpy.typing import NDArray
@@ -349,7 +349,7 @@ def location_legend(location: Location) -> str:
         location,
         "Where it was seen",
         f"<p>{mark_svg(mark)} <b>{name}</b>, ellipse: 90 %<br>{method_text(method)}</p>",
-        place_sentences(location),
+        tuple(place_sentences(location)),
         f"{_chances_legend(posterior)}"
         f"{layer_part('Candidates', f'<p>{swatch(CANDIDATE)}Candidates by rank</p>')}"
         f"{layer_part('Objects from rank ', rays) if location.explanations else ''}",
@@ -357,17 +357,17 @@ def location_legend(location: Location) -> str:
 
 
 def _answer_legend(
-    answer: Answer, title: str, head: str, sentences: Iterable[str], parts: str
+    answer: Answer, title: str, head: str, sentences: Sequence[str], parts: str
 ) -> str:
     """Return a legend as HTML: sentences on the answer, parts for its layers, and its query."""
+    notes = (*north_sentences(answer), *note_sentences(answer))
     texts = "".join(
-        f"<p>{escaped_text(sentence)}</p>"
-        for sentence in (*sentences, *north_sentences(answer), *note_sentences(answer))
+        f"<p>{'<br>'.join(map(escaped_text, part))}</p>" for part in (sentences, notes) if part
     )
-    query = "".join(f"<p>{escaped_text(sentence)}</p>" for sentence in query_sentences(answer))
+    query = "<br>".join(map(escaped_text, query_sentences(answer)))
     return (
         f"<summary>{title}</summary>{head}{texts}{parts}{shades_part()}"
-        f"{folded_part('The query', query)}{credits_part(answer.licenses)}"
+        f"{folded_part('The query', f'<p>{query}</p>')}{credits_part(answer.licenses)}"
     )
 
 
@@ -453,7 +453,7 @@ def localization_legend(localization: Localization) -> str:
         "Candidate places",
         f"<p>The best <b>{len(distances):,}</b> of {localization.cells:,} cells<br>"
         f"{method_text(method)}</p>",
-        tie_sentences(localization),
+        tuple(tie_sentences(localization)),
         layer_part("Candidates", f"<p>Distance to the query (large sign: rank 1){ramp}</p>"),
     )
 

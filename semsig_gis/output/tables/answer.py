@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from semsig_gis.core import WILDCARD, Table, figure, percent, to_degrees
+from semsig_gis.core import WILDCARD, Table, figure, percent
 from semsig_gis.localization import Location
 from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-    from numpy.typing import ArrayLike
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from semsig_gis.core import Taxonomy
     from semsig_gis.localization import Answer, ClassQuestion, Explanation, Localization
@@ -28,90 +24,49 @@ EXPLANATION = (
 def answer_tables(answer: Location | Localization) -> Iterator[Table | str]:
     """Yield the tables and sentences that describe an answer.
 
-    Parameters
-    ----------
-    answer : Location or Localization
-        The answer.
-
-    Yields
-    ------
-    Table or str
-        The candidates; by likelihood, what was known of the place, the explanations and the place;
-        then the query as it was understood, its north, and the notes.
-
-    Examples
-    --------
-    >>> from semsig_gis import localize
-    >>> answer = localize(demo_database, demo_database.signature(0), method="types:edit", top=5)
-    >>> next(answer_tables(answer)).title
-    '5 best of 955 cells, by types'
+    By likelihood, they are the candidates, what was known of the place, the explanations and the
+    place; by distance, the candidates; then the query as it was understood, its north, and notes.
     """
-    columns, cells = answer.columns, f"{answer.cells:,} cells"
+    cells = f"{answer.cells:,} cells"
+    number = len(answer.columns["cell"])
     if isinstance(answer, Location):
-        ranks = [f"{rank:,}" for rank in columns["rank"].tolist()]
-        title = f"{len(ranks)} best places in {cells}, by likelihood ({answer.noise} noise)"
-        chances = map(percent, columns["chance"].tolist())
-        yield _candidate_table(answer, title, ranks, chance=chances)
+        title = f"{number} best places in {cells}, by likelihood ({answer.noise} noise)"
+        yield _candidate_table(answer, title, "chance", percent)
         yield from _known_sentences(answer.known)
         for rank, explanation in enumerate(answer.explanations, 1):
             yield _explanation_table(rank, explanation, answer.north)
         yield from place_sentences(answer)
     else:
-        ends = zip(*(columns[name].tolist() for name in ("rank_low", "rank_high")), strict=True)
-        ranks = [str(low) if low == high else f"{low}-{high}" for low, high in ends]
-        title = f"{len(ranks)} best of {cells}, by {answer.used}"
-        distances = map(figure, columns["distance"].tolist())
-        yield _candidate_table(answer, title, ranks, distance=distances)
+        title = f"{number} best of {cells}, by {answer.used}"
+        yield _candidate_table(answer, title, "distance", figure)
         yield from tie_sentences(answer)
-    yield from query_sentences(answer)
-    yield from north_sentences(answer)
-    yield from note_sentences(answer)
+    yield from (*query_sentences(answer), *north_sentences(answer), *note_sentences(answer))
 
 
 def cities_tables(
     locations: Mapping[str, Location], elsewhere: float, *, top: int
 ) -> Iterator[Table | str]:
-    """Yield the tables and sentences on a query that may be from any of some cities.
-
-    Parameters
-    ----------
-    locations : mapping of str to Location
-        The answer of each city (see `locate_in_areas`).
-    elsewhere : float
-        Chance that the query is from none of the cities.
-    top : int
-        Number of candidates in the table.
-
-    Yields
-    ------
-    Table or str
-        The candidates of all cities, the chance of each city, and the place and the query of the
-        likeliest.
-    """
+    """Yield the best candidates of some cities, the chance of each, and the likeliest place."""
     name, best = likeliest_city(locations)
     rows = city_candidates(locations, top)
     cells = sum(location.cells for location in locations.values())
+    places = (
+        (
+            *(f"{row['rank']:,}", row["city"], str(row["cell_id"])),
+            *(f"{row['lon']:.6f}", f"{row['lat']:.6f}", percent(row["chance"]), row["types"]),
+        )
+        for row in rows
+    )
     yield Table(
         f"{len(rows)} best places in {cells:,} cells of {len(locations)} cities, by likelihood "
         f"({best.noise} noise)",
         ("rank", "city", "cell", "lon", "lat", "chance", "types"),
-        (
-            *(
-                (
-                    *(f"{row['rank']:,}", row["city"], str(row["cell_id"])),
-                    *(f"{row['lon']:.6f}", f"{row['lat']:.6f}"),
-                    *(percent(row["chance"]), row["types"]),
-                )
-                for row in rows
-            ),
-            ("", "elsewhere", "", "", "", percent(elsewhere), ""),
-        ),
+        (*places, ("", "elsewhere", "", "", "", percent(elsewhere), "")),
     )
     for area, location in locations.items():
         yield f"{area}: chance {percent(1.0 - location.elsewhere)}."
     yield f"In {name}:"
-    yield from place_sentences(best)
-    yield from query_sentences(best)
+    yield from (*place_sentences(best), *query_sentences(best))
     yield from note_sentences(*locations.values())
 
 
@@ -134,59 +89,33 @@ def city_candidates(locations: Mapping[str, Location], top: int) -> list[dict[st
 def route_tables(
     city: str, names: Iterable[object], locations: Sequence[Location]
 ) -> Iterator[Table | str]:
-    """Yield the tables and sentences on the views of a route.
-
-    Parameters
-    ----------
-    city : str
-        Name of the city.
-    names : iterable
-        Names or numbers of the views.
-    locations : sequence of Location
-        The answer to each view.
-
-    Yields
-    ------
-    Table or str
-        The place of each view, the last place, and the notes.
-    """
-    columns: dict[str, list[str]] = {"view": list(map(str, names))}
-    columns |= _position_columns(
-        locations[0], [(place.estimate.x, place.estimate.y) for place in locations]
+    """Yield the place of each view of a route, the last place in words, and the notes."""
+    rows = (
+        (
+            str(name),
+            *_position(location.estimate.x, location.estimate.y, *location.degrees),
+            f"{location.estimate.sigma:.1f}",
+            percent(location.answer.mass),
+            "yes" if location.answer.given else "cannot tell",
+        )
+        for name, location in zip(names, locations, strict=True)
     )
-    columns["± m, if there"] = [f"{place.estimate.sigma:.1f}" for place in locations]
-    columns["chance"] = [percent(place.answer.mass) for place in locations]
-    columns["answered"] = ["yes" if place.answer.given else "cannot tell" for place in locations]
-    yield Table.of_columns(f"{len(locations)} views of {city}", columns)
-    yield from place_sentences(locations[-1])
-    yield from note_sentences(*locations)
+    heads = ("view", *POSITION, "± m, if there", "chance", "answered")
+    yield Table(f"{len(locations)} views of {city}", heads, tuple(rows))
+    yield from (*place_sentences(locations[-1]), *note_sentences(*locations))
 
 
 def question_tables(
     questions: Iterable[ClassQuestion], location: Location
 ) -> Iterator[Table | str]:
-    """Yield the tables and sentences on what to look for next.
-
-    Parameters
-    ----------
-    questions : iterable of ClassQuestion
-        See `next_questions`.
-    location : Location
-        The answer so far.
-
-    Yields
-    ------
-    Table or str
-        The questions, the place, the query and the notes.
-    """
+    """Yield what to look for next, and the place, the query and the notes of the answer so far."""
     rows = (
         (row.text, row.item.symbol, percent(row.chance), f"{round(row.gain, 4):.3f}")
         for row in questions
     )
     yield Table("What to look for next", ("question", "symbol", "yes", "bits"), tuple(rows))
     yield from place_sentences(location)
-    yield from query_sentences(location)
-    yield from note_sentences(location)
+    yield from (*query_sentences(location), *note_sentences(location))
 
 
 def place_sentences(location: Location) -> Iterator[str]:
@@ -195,8 +124,7 @@ def place_sentences(location: Location) -> Iterator[str]:
     Without an answer, the region comes first, and the position only with "if it is there".
     """
     estimate, sure = location.estimate, location.answer.given
-    place = _position_columns(location, [(estimate.x, estimate.y)])
-    (x,), (y,), (lon,), (lat,) = place.values()
+    x, y, lon, lat = _position(estimate.x, estimate.y, *location.degrees)
     if not sure:
         yield f"Cannot tell. {location.region_text}."
     if location.doubt:
@@ -259,28 +187,23 @@ def note_sentences(*answers: Answer) -> Iterator[str]:
 
 
 def _candidate_table(
-    answer: Answer, title: str, ranks: list[str], **scores: Iterable[str]
+    answer: Answer, title: str, score: str, score_text: Callable[[float], str]
 ) -> Table:
     """Return the table of candidates, with a column of scores."""
-    columns = answer.columns
-    return Table.of_columns(
-        title,
-        {
-            "rank": ranks,
-            "cell": map(str, columns["cell_id"].tolist()),
-            **_position_columns(answer, np.stack([columns["x"], columns["y"]], axis=1)),
-            **scores,
-            "types": columns["types"].tolist(),
-        },
-    )
+    rows = []
+    for row in answer.candidate_rows():
+        low, high = (row.get(name, row.get("rank")) for name in ("rank_low", "rank_high"))
+        rank = f"{low:,}" if low == high else f"{low}-{high}"
+        position = _position(row["x"], row["y"], row["lon"], row["lat"])
+        rows.append((rank, str(row["cell_id"]), *position, score_text(row[score]), row["types"]))
+    return Table(title, ("rank", "cell", *POSITION, score, "types"), tuple(rows))
 
 
-def _position_columns(answer: Answer, places: ArrayLike) -> dict[str, list[str]]:
-    """Return places in metres and degrees as columns of text, rounded as in JSON."""
-    x, y = np.asarray(places, np.float64).T
-    lon, lat = (axis.round(7) for axis in to_degrees(answer.crs).transform(x, y))
-    forms = {"x": (x, ".1f"), "y": (y, ".1f"), "lon": (lon, ".6f"), "lat": (lat, ".6f")}
-    return {name: [format(value, form) for value in axis] for name, (axis, form) in forms.items()}
+POSITION = ("x", "y", "lon", "lat")
+
+
+def _position(x: float, y: float, lon: float, lat: float) -> tuple[str, str, str, str]:
+    return f"{x:.1f}", f"{y:.1f}", f"{lon:.6f}", f"{lat:.6f}"
 
 
 def _known_sentences(knowledge: Mapping[str, Any]) -> Iterator[str]:
