@@ -221,14 +221,26 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     return (f"the map has no {legend}, so {used} not used.", *notes)
 
 
+def doubt_parts(elsewhere: float, fit: float | None) -> dict[str, float]:
+    """Return the numbers of `doubt_sentence`, without those that are unremarkable.
+
+    ``elsewhere`` is the chance of being from elsewhere, ``worse_than`` how many of 1,000 simulated
+    views from the best place fit it better.
+    """
+    parts = {"elsewhere": elsewhere} if elsewhere >= LEAST_ELSEWHERE else {}
+    if fit is not None and fit < LEAST_FIT:
+        parts["worse_than"] = round(1000.0 * (1.0 - fit))
+    return parts
+
+
 def doubt_sentence(elsewhere: float, fit: float | None) -> str:
     """Return a sentence on the chance that a view is from elsewhere and on how well it fits.
 
     It is empty if both are unremarkable; see `Location` for the numbers.
     """
-    worse = fit is not None and fit < LEAST_FIT
-    fits = f"worse than {1000.0 * (1.0 - (fit or 0.0)):,.0f} of 1,000 simulated views from there"
-    if elsewhere < LEAST_ELSEWHERE:
-        return f"The view fits the best place badly: {fits}." if worse else ""
-    badly = f"; it fits the best place {fits}" if worse else ""
+    parts = doubt_parts(elsewhere, fit)
+    fits = f"worse than {parts.get('worse_than', 0):,.0f} of 1,000 simulated views from there"
+    if "elsewhere" not in parts:
+        return f"The view fits the best place badly: {fits}." if parts else ""
+    badly = f"; it fits the best place {fits}" if "worse_than" in parts else ""
     return f"The view may not be from this area: chance {percent(elsewhere)}{badly}."

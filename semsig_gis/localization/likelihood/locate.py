@@ -23,6 +23,7 @@ from semsig_gis.localization.answers import (
     Ranking,
     candidate_columns,
     check_top,
+    doubt_parts,
     doubt_sentence,
     query_notes,
 )
@@ -229,8 +230,9 @@ class Location(Answer):
 
         ``place`` has the keys of `PlaceEstimate.to_dict` and ``cell_id``, ``lon``, ``lat``,
         ``chance`` and ``within_m``. ``threshold`` is None if no chance is enough. The ``places`` of
-        the ``region`` are None if there are over 100, and ``doubt`` may be empty. ``candidates``
-        have the keys of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, for the first of them,
+        the ``region`` are None if there are over 100. ``doubt`` may be empty; ``doubt_parts`` are
+        the numbers in it (see `answers.doubt_parts`). ``candidates`` have the
+        keys of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, for the first of them,
         ``explanation``, with bearings from ``north`` like those of the query. ``prior`` has the
         keys of `known` and ``ratio``; it is None without a prior.
         """
@@ -258,6 +260,7 @@ class Location(Answer):
             "elsewhere": self.elsewhere,
             "fit": self.fit,
             "doubt": self.doubt,
+            "doubt_parts": doubt_parts(self.elsewhere, self.fit),
             "region": {
                 "share": REGION_SHARE,
                 "cells": len(self.region),

@@ -100,6 +100,7 @@ def test_a_view_from_elsewhere_lowers_the_chances_of_all_places() -> None:
     assert [plain[name] for name in ("answered", "elsewhere", "fit")] == [False, 0.6, 0.002]
     assert plain["place"]["chance"] == doubted.answer.mass
     assert plain["doubt"] == doubted.doubt
+    assert plain["doubt_parts"] == {"elsewhere": 0.6, "worse_than": 998}
     assert "doubt The view may not be from this area" in repr(doubted)
     assert location.doubted(0.05).answer.given
 
