@@ -38,7 +38,8 @@ def small_evaluation(distortion: str = "strong") -> Evaluation:
 @functools.cache
 def small_location() -> Location:
     database, _ = small_city()
-    return locate(build_index(database, named_noise("light")), database.signature(7), refined=False)
+    index = build_index(database, named_noise("light"))
+    return locate(index, database.signature(7), refined=False, explained=1)
 
 
 @functools.cache

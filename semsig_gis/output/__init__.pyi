@@ -37,7 +37,6 @@ from .files.csv import as_written as as_written
 from .files.csv import formula_safe as formula_safe
 from .files.tif import export_geotiff as export_geotiff
 from .html.answer import RASTER_SUFFIXES as RASTER_SUFFIXES
-from .html.answer import RAYS as RAYS
 from .html.answer import SECTOR as SECTOR
 from .html.answer import localization_legend as localization_legend
 from .html.answer import localization_map as localization_map
@@ -90,6 +89,7 @@ from .html.page_elements import to_latlon as to_latlon
 from .html.page_elements import to_metres as to_metres
 from .layers import LAYERS as LAYERS
 from .layers import layer_names as layer_names
+from .layers.answer import RAYS as RAYS
 from .layers.answer import answer_layers as answer_layers
 from .layers.cells import cells_layer as cells_layer
 from .layers.columns import form_of as form_of

@@ -125,8 +125,8 @@ def _add_place(
             content = int(value) if isinstance(value, bool) else value  # as GDAL reads it
             text = one_line(content) if isinstance(content, str) else content
             _add_text(data, "SimpleData", text).set("name", str(column))
-    if shape.geom_type == "Point":
-        _add_text(ET.SubElement(place, "Point"), "coordinates", _coordinates(shape))
+    if shape.geom_type != "Polygon":  # a point or a line
+        _add_text(ET.SubElement(place, shape.geom_type), "coordinates", _coordinates(shape))
         return
     polygon = ET.SubElement(place, "Polygon")
     for number, ring in enumerate(shapely.get_rings(shape)):  # the outer ring is the first

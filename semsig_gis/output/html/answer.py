@@ -63,6 +63,7 @@ from semsig_gis.output.layers.answer import (
     CANDIDATE_FORM,
     OBJECT_FORM,
     PLACE_FORM,
+    RAYS,
     REGION_FORM,
     place_row,
 )
@@ -97,23 +98,8 @@ PLACE_NAMES = (
 CANDIDATE_NAMES = ("chance", "cell_chance", "distance", "loglik", "heading", "cell_id")
 REGION_NAMES = ("chance", "cells", "km2", "best_cell_id")
 LISTED_NAMES = ("chance", "distance", "types", "cell_id")
-OBJECT_NAMES = tuple(column.name for columns in OBJECT_FORM.values() for column in columns)
+OBJECT_NAMES = tuple(column.name for column in OBJECT_FORM["Object"][2:])
 REGION = {"color": CHANCES[0.9], "weight": 3, "opacity": 0.9, "fill": True, "fillOpacity": 0.25}
-# Meaning of each verdict on an object, and the style of its ray; the default colour is that of
-# `VERDICTS`.
-RAYS: dict[str, tuple[str, dict[str, object]]] = {
-    "matched": ("a street object", {"weight": 2, "opacity": 0.9, "dashArray": None}),
-    "misnamed": ("one of another class", {"weight": 2, "opacity": 0.9, "dashArray": "9 4"}),
-    "missed": (
-        "a street object not in the query",
-        {"color": "#808080", "weight": 1, "opacity": 0.9, "dashArray": "3 5"},
-    ),
-    "false": ("no street object", {"weight": 2, "opacity": 0.9, "dashArray": "3 5"}),
-    "outside": (
-        "a street object outside the photos",
-        {"weight": 1, "opacity": 0.5, "dashArray": "1 5"},
-    ),
-}
 CANDIDATE = "#ffffff"
 SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
 SURROUNDINGS_M = 45.0  # smallest distance that is shown around the answer
@@ -312,11 +298,11 @@ def _add_candidates(
         {**row, "place": place} for row, place in zip(answer.candidate_rows(), places, strict=True)
     ]
     turns = [row.get("heading") or 0.0 for row in rows]
-    asked = [
+    queries = [
         query_signature(query, database.taxonomy, radius=spec.radius, place=place, turn=turn)
         for place, turn in zip(places, turns, strict=True)
     ]
-    there = [
+    cell_views = [
         cell_signature(database, cell, query, turn, place=place)
         for cell, place, turn in zip(cells, places, turns, strict=True)
     ]
@@ -325,7 +311,7 @@ def _add_candidates(
         CANDIDATE_FORM,
         [name for name in CANDIDATE_NAMES if name in rows[0]],
         looks,
-        wheels=[("Query", asked), ("Cell sees", there)],
+        wheels=[("Query", queries), ("Cell sees", cell_views)],
         signs=panel_signs(database),
     )
     add_layer(map_, f"Candidates ({len(rows):,})", *points, group="answer")

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core import CHANCES
-from semsig_gis.localization import UNKNOWN_NAME
 from semsig_gis.observation import View
 from semsig_gis.output.html.page_elements import exact_latlon
+from semsig_gis.output.layers.answer import explanation_rows
 from semsig_gis.output.layers.columns import described
 
 if TYPE_CHECKING:
@@ -81,36 +81,12 @@ def answer_drawing(location: Location) -> dict[str, Any]:
 
 def _rays(location: Location, explanation: Explanation) -> list[dict[str, Any]]:
     """Return a ray for each row of an explanation."""
-    database = location.posterior.database
-    titles = {item.name: item.title for item in database.taxonomy.classes}
-    titles[UNKNOWN_NAME] = "Something"
-    rows = explanation.rows
-    ends = explanation.ends(database.reach).tolist()
-    signs = [row["place"] or end for row, end in zip(rows, ends, strict=True)]
-    here, *places = exact_latlon([explanation.xy, *ends, *signs], database.crs)
-    return [
-        {
-            "verdict": row["verdict"],
-            "chance": row["chance"],
-            "class": row["object_class"] or row["query_class"],
-            "title": titles[row["object_class"] or row["query_class"]],
-            "seen_class": row["query_class"],
-            "seen_title": titles.get(row["query_class"]),
-            "seen_bearing": row["query_bearing"],
-            "seen_range": row["query_range"],
-            "object_title": titles.get(row["object_class"]),
-            "bearing": row["object_bearing"],
-            "distance": row["distance"],
-            "bearing_error": row["bearing_error"],
-            "source": row["source"],
-            "source_id": row["source_id"],
-            "query": row["query"],
-            "from": here,
-            "to": places[number],
-            "sign": places[len(rows) + number],
-        }
-        for number, row in enumerate(rows)
-    ]
+    rows, ends = explanation_rows(location, explanation), ("from", "to", "sign")
+    metres = [row[name] for row in rows for name in ends]
+    degrees = exact_latlon(np.array(metres).reshape(-1, 2), location.crs)
+    for number, row in enumerate(rows):
+        row.update(zip(ends, degrees[3 * number : 3 * number + 3], strict=True))
+    return rows
 
 
 def described_points(

@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING, Any
 import geopandas as gpd
 import numpy as np
 import pandas as pd
+import shapely
 
+from semsig_gis.core import VERDICTS
 from semsig_gis.database import CellTable
-from semsig_gis.localization import Location
+from semsig_gis.localization import UNKNOWN_NAME, Location
 from semsig_gis.output.layers.columns import form_of
 from semsig_gis.output.layers.model import Display, table_layer
-from semsig_gis.output.layers.styles import by_answer, by_rank
+from semsig_gis.output.layers.styles import Style, StyleClass, Symbol, by_answer, by_rank
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from semsig_gis.database import SignatureDatabase
-    from semsig_gis.localization import Answer, SearchRegions
+    from semsig_gis.localization import Answer, Explanation, SearchRegions
     from semsig_gis.output.layers.model import Layer
 
 PLACE_FORM = form_of("""
@@ -80,6 +82,8 @@ searched_percent = ["Share of the city up to here", "Of the area of all cells.",
 
 OBJECT_FORM = form_of("""
 [Object]
+verdict = ["Verdict", "Whether the object of the query is a street object, and which."]
+candidate = ["Candidate", "Rank of the place from which the objects are compared."]
 chance = ["Chance", "Of the verdict being right, from 0 to 1.", "1", 2]
 seen_title = ["Seen as", "Class of the object of the query."]
 seen_bearing = ["Bearing seen", "From the candidate, clockwise from grid north.", "°", 1]
@@ -92,6 +96,34 @@ source = ["Source", "Of the street object."]
 source_id = ["Identifier", "Of the street object in its source."]
 """)
 
+# Meaning of each verdict on an object, and the style of its ray; the default colour is that of
+# `VERDICTS`.
+RAYS: dict[str, tuple[str, dict[str, object]]] = {
+    "matched": ("a street object", {"weight": 2, "opacity": 0.9, "dashArray": None}),
+    "misnamed": ("one of another class", {"weight": 2, "opacity": 0.9, "dashArray": "9 4"}),
+    "missed": (
+        "a street object not in the query",
+        {"color": "#808080", "weight": 1, "opacity": 0.9, "dashArray": "3 5"},
+    ),
+    "false": ("no street object", {"weight": 2, "opacity": 0.9, "dashArray": "3 5"}),
+    "outside": (
+        "a street object outside the photos",
+        {"weight": 1, "opacity": 0.5, "dashArray": "1 5"},
+    ),
+}
+RAY_STYLE = Style(
+    name="Verdict",
+    column="verdict",
+    classes=tuple(
+        StyleClass(
+            label=f"{verdict}: {meaning}",
+            symbol=Symbol(colour=str(look.get("color", VERDICTS[verdict]))),
+            value=verdict,
+        )
+        for verdict, (meaning, look) in RAYS.items()
+    ),
+)
+
 GROUP = "Answer"
 # A candidate of the likelihood method has one rank, others may be tied.
 RANK = "coalesce(attribute('rank'), attribute('rank_low'))"
@@ -103,7 +135,10 @@ CANDIDATE_LABEL = (
 def answer_layers(
     answer: Answer, database: SignatureDatabase, regions: SearchRegions
 ) -> list[Layer]:
-    """Return layers of the regions to search, the candidates and, if estimated, the place."""
+    """Return layers of the regions to search and the candidates.
+
+    By likelihood, there are also the place, its ellipse and, of explained candidates, the rays.
+    """
     candidates = answer.to_geodataframe()
     cells = CellTable(database.select(candidates["cell"].to_numpy()))
     columns = cells.columns(slice(0, len(candidates)))
@@ -155,24 +190,94 @@ def answer_layers(
     ]
     if not isinstance(answer, Location):
         return layers
-    row = place_row(answer)
-    points = gpd.points_from_xy([row["x"]], [row["y"]])
-    estimate = layer(
-        gpd.GeoDataFrame(pd.DataFrame([row]), geometry=points, crs=answer.crs),
-        name="place",
-        title="Place",
-        description="Where the query was most probably seen from, and how sure that is.",
-        geometry="point",
-        form=PLACE_FORM,
-        display=Display(
-            level=8,
-            group=GROUP,
-            name="""'place, answer ' || "answer" """,
-            tip=("chance", "elsewhere", "sigma"),
-        ),
-        styles=(by_answer(),),
-    )
-    return [*layers, estimate]
+    table = pd.DataFrame([place_row(answer)])
+    layers += [
+        layer(
+            gpd.GeoDataFrame(table, geometry=shapes, crs=answer.crs),
+            name=name,
+            title=title,
+            description=description,
+            geometry=geometry,
+            form=PLACE_FORM,
+            display=Display(
+                level=level,
+                group=GROUP,
+                name=f"""'{name}, answer ' || "answer" """,
+                tip=("chance", "elsewhere", "sigma"),
+            ),
+            styles=(by_answer(geometry=geometry),),
+        )
+        for level, name, title, description, geometry, shapes in (
+            (
+                *(8, "place", "Place"),
+                "Where the query was most probably seen from, and how sure that is.",
+                *("point", gpd.points_from_xy(table["x"], table["y"])),
+            ),
+            (
+                *(9, "ellipse", "Ellipse of the place"),
+                "Contains the place with a chance of 90 %, if the answer is right.",
+                *("polygon", [shapely.Polygon(answer.estimate.outline())]),
+            ),
+        )
+    ]
+    if answer.explanations:
+        rays = [
+            {"candidate": rank, **row}
+            for rank, explanation in enumerate(answer.explanations, start=1)
+            for row in explanation_rows(answer, explanation)
+        ]
+        names = [column.name for column in OBJECT_FORM["Object"]]
+        lines = [shapely.LineString([row["from"], row["to"]]) for row in rays]
+        layers.append(
+            layer(
+                gpd.GeoDataFrame(pd.DataFrame(rays, columns=names), geometry=lines, crs=answer.crs),
+                name="rays",
+                title="Objects of the query",
+                description="From a candidate to where an object was seen or, if missed, is.",
+                geometry="line",
+                form=OBJECT_FORM,
+                display=Display(
+                    level=10, group=GROUP, name='"verdict"', tip=("chance", "object_title")
+                ),
+                styles=(RAY_STYLE,),
+            )
+        )
+    return layers
+
+
+def explanation_rows(location: Location, explanation: Explanation) -> list[dict[str, Any]]:
+    """Return the objects of the query and of the map at a candidate, with ends of lines in metres.
+
+    A line goes ``from`` the candidate ``to`` where the object was seen or is; ``sign`` is the place
+    of the street object or, without one, that end. Bearings are from grid north.
+    """
+    database = location.posterior.database
+    titles = {item.name: item.title for item in database.taxonomy.classes}
+    titles[UNKNOWN_NAME] = "Something"
+    ends = explanation.ends(database.reach).tolist()
+    return [
+        {
+            "verdict": row["verdict"],
+            "chance": row["chance"],
+            "class": row["object_class"] or row["query_class"],
+            "title": titles[row["object_class"] or row["query_class"]],
+            "seen_class": row["query_class"],
+            "seen_title": titles.get(row["query_class"]),
+            "seen_bearing": row["query_bearing"],
+            "seen_range": row["query_range"],
+            "object_title": titles.get(row["object_class"]),
+            "bearing": row["object_bearing"],
+            "distance": row["distance"],
+            "bearing_error": row["bearing_error"],
+            "source": row["source"],
+            "source_id": row["source_id"],
+            "query": row["query"],
+            "from": explanation.xy,
+            "to": end,
+            "sign": row["place"] or end,
+        }
+        for row, end in zip(explanation.rows, ends, strict=True)
+    ]
 
 
 def place_row(location: Location) -> dict[str, Any]:

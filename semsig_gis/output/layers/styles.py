@@ -237,9 +237,9 @@ def by_outcome(*, geometry: str) -> Style:
     return _by_mark("Outcome", OUTCOMES, geometry)
 
 
-def by_answer() -> Style:
-    """Return a style of the best place, by whether it is the answer or withheld."""
-    return _by_mark("Answer", ANSWERS, "point")
+def by_answer(*, geometry: str) -> Style:
+    """Return a style of the best place or its ellipse, by whether it is the answer or withheld."""
+    return _by_mark("Answer", ANSWERS, geometry)
 
 
 def _by_mark(name: str, marks: Mapping[str, Mark], geometry: str) -> Style:
@@ -251,6 +251,8 @@ def _by_mark(name: str, marks: Mapping[str, Mark], geometry: str) -> Style:
         if geometry == "line":
             end = replace(symbol, shape="x", metres=10.0, least_mm=1.4, edge=mark.colour)
             symbol = replace(end, opacity=0.59)
+        if geometry == "polygon":
+            symbol = Symbol(colour=mark.colour, opacity=0.0, edge=mark.colour, edge_mm=0.6)
         classes.append(StyleClass(label=value, symbol=symbol, value=value))
     return Style(name=name, column=name.lower(), classes=tuple(classes))
 

@@ -108,7 +108,7 @@ def route_tables(
 def question_tables(
     questions: Iterable[ClassQuestion], location: Location
 ) -> Iterator[Table | str]:
-    """Yield what to look for next, and the place, the query and the notes of the answer so far."""
+    """Yield what to look for next, with the place, the query and the notes of the answer."""
     rows = (
         (row.text, row.item.symbol, percent(row.chance), f"{round(row.gain, 4):.3f}")
         for row in questions

@@ -30,7 +30,13 @@ def layers_of(file: Path) -> dict[str, gpd.GeoDataFrame]:
     """Return the tables of an answer by the kind of their rows."""
     if file.suffix == ".geojson":
         return dict(iter(gpd.read_file(file).groupby("layer")))
-    kinds = {"Regions to search": "region", "Candidates": "candidate", "Place": "place"}
+    kinds = {
+        "Regions to search": "region",
+        "Candidates": "candidate",
+        "Place": "place",
+        "Ellipse of the place": "ellipse",
+        "Objects of the query": "ray",
+    }
     names = pyogrio.list_layers(file)[:, 0]
     return {kinds[name]: gpd.read_file(file, layer=name) for name in names}
 
@@ -43,7 +49,7 @@ def test_file_contains_all_layers_of_an_answer(
     file = tmp_path / f"a{suffix}"
     regions = export_answer(answer, CITY, file).table
     tables = layers_of(file)
-    places = ["place"] if answer is LOCATION else []
+    places = ["place", "ellipse", "ray"] if answer is LOCATION else []
     assert {*tables} == {"region", "candidate", *places}
     for kind, expected in {"region": regions, "candidate": answer.to_geodataframe()}.items():
         table = tables[kind]
@@ -61,6 +67,17 @@ def test_file_contains_all_layers_of_an_answer(
         assert float(row.sigma) == pytest.approx(estimate.sigma)
         assert bool(row.refined) is estimate.refined
         assert [float(row.elsewhere), float(row.fit)] == [0.25, 0.004]
+        longer, shorter, bearing = estimate.ellipse()
+        axes = [float(row.longer_m), float(row.shorter_m), float(row.bearing)]
+        assert axes == pytest.approx([longer, shorter, bearing])
+        (ellipse,) = tables["ellipse"].to_crs(CITY.crs).geometry
+        assert ellipse.area == pytest.approx(np.pi * longer * shorter, rel=0.02)
+        (explanation,) = LOCATION.explanations
+        rays = tables["ray"].to_crs(CITY.crs)
+        assert rays["verdict"].tolist() == [fact["verdict"] for fact in explanation.rows]
+        ends = [line.coords[-1] for line in rays.geometry]
+        assert np.allclose(ends, explanation.ends(CITY.reach), atol=0.02)
+        assert {line.coords[0] for line in rays.geometry} == {rays.geometry.iloc[0].coords[0]}
 
 
 def test_files_have_the_licences_and_load_no_other_files(tmp_path: Path) -> None:
