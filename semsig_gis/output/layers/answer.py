@@ -226,11 +226,14 @@ def answer_layers(
             for rank, explanation in enumerate(answer.explanations, start=1)
             for row in explanation_rows(answer, explanation)
         ]
-        names = [column.name for column in OBJECT_FORM["Object"]]
+        fields = OBJECT_FORM["Object"]
+        ray_table = pd.DataFrame(rays, columns=[field.name for field in fields])
+        # A column of numbers is one even without any number.
+        ray_table = ray_table.astype({field.name: float for field in fields if field.decimals})
         lines = [shapely.LineString([row["from"], row["to"]]) for row in rays]
         layers.append(
             layer(
-                gpd.GeoDataFrame(pd.DataFrame(rays, columns=names), geometry=lines, crs=answer.crs),
+                gpd.GeoDataFrame(ray_table, geometry=lines, crs=answer.crs),
                 name="rays",
                 title="Objects of the query",
                 description="From a candidate to where an object was seen or, if missed, is.",
