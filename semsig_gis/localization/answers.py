@@ -7,7 +7,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NotRequired
 
 import numpy as np
 from typing_extensions import TypedDict
@@ -221,13 +221,22 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     return (f"the map has no {legend}, so {used} not used.", *notes)
 
 
-def doubt_parts(elsewhere: float, fit: float | None) -> dict[str, float]:
-    """Return the numbers of `doubt_sentence`, without those that are unremarkable.
+class DoubtRecord(TypedDict):
+    """The numbers of `doubt_sentence`, without those that are unremarkable.
 
     ``elsewhere`` is the chance of being from elsewhere, ``worse_than`` how many of 1,000 simulated
     views from the best place fit it better.
     """
-    parts = {"elsewhere": elsewhere} if elsewhere >= LEAST_ELSEWHERE else {}
+
+    elsewhere: NotRequired[float]
+    worse_than: NotRequired[int]
+
+
+def doubt_parts(elsewhere: float, fit: float | None) -> DoubtRecord:
+    """Return the numbers of `doubt_sentence`."""
+    parts = DoubtRecord()
+    if elsewhere >= LEAST_ELSEWHERE:
+        parts["elsewhere"] = elsewhere
     if fit is not None and fit < LEAST_FIT:
         parts["worse_than"] = round(1000.0 * (1.0 - fit))
     return parts

@@ -231,7 +231,7 @@ class Location(Answer):
         ``place`` has the keys of `PlaceEstimate.to_dict` and ``cell_id``, ``lon``, ``lat``,
         ``chance`` and ``within_m``. ``threshold`` is None if no chance is enough. The ``places`` of
         the ``region`` are None if there are over 100. ``doubt`` may be empty; ``doubt_parts`` are
-        the numbers in it (see `answers.doubt_parts`). ``candidates`` have the
+        the numbers in it (see `DoubtRecord`). ``candidates`` have the
         keys of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, for the first of them,
         ``explanation``, with bearings from ``north`` like those of the query. ``prior`` has the
         keys of `known` and ``ratio``; it is None without a prior.

@@ -6,7 +6,12 @@ from typing import NotRequired
 
 from typing_extensions import TypedDict
 
-from semsig_gis.localization.answers import AnswerRecord, CandidateRecord, PositionRecord
+from semsig_gis.localization.answers import (
+    AnswerRecord,
+    CandidateRecord,
+    DoubtRecord,  # noqa: TC001 - pydantic reads it
+    PositionRecord,
+)
 from semsig_gis.localization.likelihood.estimate import EstimateRecord
 from semsig_gis.localization.likelihood.explain import ExplanationRecord  # noqa: TC001 - pydantic reads it
 
@@ -73,6 +78,7 @@ class LocationRecord(AnswerRecord):
     elsewhere: float
     fit: float | None
     doubt: str
+    doubt_parts: DoubtRecord
     region: RegionRecord
     entropy_bits: float
     prior: PriorRecord | None

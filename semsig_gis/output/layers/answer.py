@@ -286,8 +286,8 @@ def explanation_rows(location: Location, explanation: Explanation) -> list[dict[
 def place_row(location: Location) -> dict[str, Any]:
     """Return the columns of the place of an answer by likelihood; missing numbers are NaN."""
     facts = location.to_dict()
-    place = {name: value for name, value in facts["place"].items() if name != "covariance"}
-    ellipse = place.pop("ellipse_90")
+    place: dict[str, Any] = {**facts["place"]}
+    ellipse, _ = place.pop("ellipse_90"), place.pop("covariance")
     row = {
         "answer": "given" if facts["answered"] else "withheld",
         **place,
