@@ -480,11 +480,11 @@ def test_answer_is_exported(page: Page, suffix: str, tmp_path: Path) -> None:
     assert headers["content-disposition"] == f'attachment; filename="answer.{suffix}"'
     file = tmp_path / f"answer.{suffix}"
     file.write_bytes(content)
-    folders = ["Regions to search", "Candidates"]
-    layers = {"gpkg": ["regions", "candidates"], "kml": folders}.get(suffix, [None])
+    folders = ["Regions to search", "Candidates", "Objects of the query"]
+    layers = {"gpkg": ["regions", "candidates", "rays"], "kml": folders}.get(suffix, [None])
     tables = [gpd.read_file(file, layer=layer).to_crs("EPSG:4326") for layer in layers]
     kinds = {kind for table in tables for kind in table.geom_type}
-    assert kinds == {"Polygon", "Point"}
+    assert kinds == {"Polygon", "Point", "LineString"}
     if suffix != "gpkg":
         assert tables[0]["Name"].tolist()[0] == "region 1"
     lat, lon = latlon(page.bench, cell)

@@ -268,6 +268,8 @@ def test_every_layer_has_a_style(file: Path, tmp_path: Path) -> None:
         ("regions", "geom", "Rank", 1),
         ("candidates", "geom", "Rank", 1),
         ("place", "geom", "Answer", 1),
+        ("ellipse", "geom", "Answer", 1),
+        ("rays", "geom", "Verdict", 1),
     ]
     for source, layer, _, _, _, qml, updated in styles:
         root = ET.fromstring(qml)  # noqa: S314 - our own
