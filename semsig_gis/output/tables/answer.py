@@ -45,8 +45,8 @@ def answer_tables(answer: Location | Localization) -> Iterator[Table | str]:
 
 def cities_tables(
     locations: Mapping[str, Location], elsewhere: float, *, top: int
-) -> Iterator[Table | str]:
-    """Yield the best candidates of some cities, the chance of each, and the likeliest place."""
+) -> list[Table | str]:
+    """Return the best candidates of some cities, the chance of each, and the likeliest place."""
     name, best = likeliest_city(locations)
     rows = city_candidates(locations, top)
     cells = sum(location.cells for location in locations.values())
@@ -57,17 +57,21 @@ def cities_tables(
         )
         for row in rows
     )
-    yield Table(
+    table = Table(
         f"{len(rows)} best places in {cells:,} cells of {len(locations)} cities, by likelihood "
         f"({best.noise} noise)",
         ("rank", "city", "cell", "lon", "lat", "chance", "types"),
         (*places, ("", "elsewhere", "", "", "", percent(elsewhere), "")),
     )
-    for area, location in locations.items():
-        yield f"{area}: chance {percent(1.0 - location.elsewhere)}."
-    yield f"In {name}:"
-    yield from (*place_sentences(best), *query_sentences(best))
-    yield from note_sentences(*locations.values())
+    chances = {area: percent(1.0 - location.elsewhere) for area, location in locations.items()}
+    return [
+        table,
+        *(f"{area}: chance {chance}." for area, chance in chances.items()),
+        f"In {name}:",
+        *place_sentences(best),
+        *query_sentences(best),
+        *note_sentences(*locations.values()),
+    ]
 
 
 def likeliest_city(locations: Mapping[str, Location]) -> tuple[str, Location]:
@@ -88,8 +92,8 @@ def city_candidates(locations: Mapping[str, Location], top: int) -> list[dict[st
 
 def route_tables(
     city: str, names: Iterable[object], locations: Sequence[Location]
-) -> Iterator[Table | str]:
-    """Yield the place of each view of a route, the last place in words, and the notes."""
+) -> list[Table | str]:
+    """Return the place of each view of a route, the last place in words, and the notes."""
     rows = (
         (
             str(name),
@@ -101,50 +105,47 @@ def route_tables(
         for name, location in zip(names, locations, strict=True)
     )
     heads = ("view", *POSITION, "± m, if there", "chance", "answered")
-    yield Table(f"{len(locations)} views of {city}", heads, tuple(rows))
-    yield from (*place_sentences(locations[-1]), *note_sentences(*locations))
+    table = Table(f"{len(locations)} views of {city}", heads, tuple(rows))
+    return [table, *place_sentences(locations[-1]), *note_sentences(*locations)]
 
 
-def question_tables(
-    questions: Iterable[ClassQuestion], location: Location
-) -> Iterator[Table | str]:
-    """Yield what to look for next, with the place, the query and the notes of the answer."""
+def question_tables(questions: Iterable[ClassQuestion], location: Location) -> list[Table | str]:
+    """Return what to look for next, with the place, the query and the notes of the answer."""
     rows = (
         (row.text, row.item.symbol, percent(row.chance), f"{round(row.gain, 4):.3f}")
         for row in questions
     )
-    yield Table("What to look for next", ("question", "symbol", "yes", "bits"), tuple(rows))
-    yield from place_sentences(location)
-    yield from (*query_sentences(location), *note_sentences(location))
+    table = Table("What to look for next", ("question", "symbol", "yes", "bits"), tuple(rows))
+    sentences = *place_sentences(location), *query_sentences(location), *note_sentences(location)
+    return [table, *sentences]
 
 
-def place_sentences(location: Location) -> Iterator[str]:
-    """Yield the place of an answer by likelihood, and whether it is certain enough.
+def place_sentences(location: Location) -> list[str]:
+    """Return the place of an answer by likelihood, and whether it is certain enough.
 
     Without an answer, the region comes first, and the position only with "if it is there".
     """
     estimate, sure = location.estimate, location.answer.given
     x, y, lon, lat = _position(estimate.x, estimate.y, *location.degrees)
-    if not sure:
-        yield f"Cannot tell. {location.region_text}."
-    if location.doubt:
-        yield location.doubt
     best, there = ("", "") if sure else ("Best place: ", "If it is there: ")
     chance = f"within {location.rule.radius:g} m of it: chance {percent(location.answer.mass)}"
-    yield f"{best}{lat}, {lon} (lat, lon), {chance}."
     longer, shorter, bearing = estimate.ellipse()
-    yield (
-        f"{there or 'Position: '}x {x}, y {y} ± {estimate.sigma:.1f} m "
-        f"(90 %: {longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across)."
-    )
+    place = [
+        f"{best}{lat}, {lon} (lat, lon), {chance}.",
+        (
+            f"{there or 'Position: '}x {x}, y {y} ± {estimate.sigma:.1f} m "
+            f"(90 %: {longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across)."
+        ),
+    ]
     if estimate.heading is not None:
         north = "north of the query" if there else "North of the query:"
-        yield (
+        place.append(
             f"{there}{north} {estimate.heading % 360.0:.1f}° ± {estimate.heading_sigma:.1f}° "
             f"from {location.north.name} north."
         )
-    if sure:
-        yield f"{location.region_text}."
+    doubt = [location.doubt] if location.doubt else []
+    region = f"{location.region_text}."
+    return [*doubt, *place, region] if sure else [f"Cannot tell. {region}", *doubt, *place]
 
 
 def query_sentences(answer: Answer) -> Iterator[str]:
