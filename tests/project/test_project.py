@@ -199,8 +199,10 @@ def test_exported_names_exist(front: Path) -> None:
     assert all(hasattr(package, name) for name in dir(package))
 
 
+# Whole packages, as `from semsig_gis import database as databases`, are fronts.
+FRONTS = "|".join(path.parent.name for path in PACKAGE.glob("*/__init__.pyi"))
 ROOT_IMPORT = re.compile(
-    r"^ *(import semsig_gis\b|from semsig_gis import (?!__version__$))", re.MULTILINE
+    rf"^ *(import semsig_gis$|from semsig_gis import (?!__version__$|({FRONTS}) as ))", re.MULTILINE
 )
 
 
