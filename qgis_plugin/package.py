@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import configparser
 import io
+import json
 import os
 import re
 import struct
@@ -22,6 +23,7 @@ from xml.etree import ElementTree as ET
 
 __all__ = [
     "build_wheel",
+    "commands_schema",
     "compiled",
     "faults",
     "files",
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-SUFFIXES = {".py", ".qml", ".svg", ".txt"}
+SUFFIXES = {".py", ".svg", ".txt"}
 # The earliest time in a zip file, so that the same files give the same bytes.
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 ADDRESSES = ("tracker", "repository", "homepage")
@@ -75,7 +77,26 @@ def files(email: str = "") -> dict[str, bytes]:
     for path in (HERE / "i18n").glob("*.ts"):
         contents[f"semsig/i18n/{path.stem}.qm"] = compiled(read_translations(path))
     contents["semsig/metadata.txt"] = metadata(email).encode()
+    contents["semsig/commands.json"] = commands_schema()
     return dict(sorted(contents.items()))
+
+
+def commands_schema() -> bytes:
+    """Return the schema of the requests of all commands, from which the tools are made, as JSON."""
+    printed = _run("semsig_gis.cli", "schema", what="The schema of the commands")
+    commands = json.loads(printed)["commands"]
+    for command in commands.values():
+        del command["result"]
+    return json.dumps({"commands": commands}, ensure_ascii=False, indent=1).encode()
+
+
+def _run(*words: str, what: str) -> str:
+    """Run a module of Python in the project, and return what it prints."""
+    line = [sys.executable, "-m", *words]
+    process = subprocess.run(line, cwd=ROOT, check=False, capture_output=True, encoding="utf-8")  # noqa: S603
+    if process.returncode != 0:
+        sys.exit(f"{what} cannot be made: {process.stderr.strip()}")
+    return process.stdout
 
 
 def read_translations(path: Path) -> dict[str, str]:
@@ -216,10 +237,8 @@ def build_wheel(folder: Path) -> Path:
     Path
         The path of the wheel.
     """
-    line = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder.absolute())]
-    process = subprocess.run(line, cwd=ROOT, check=False, capture_output=True, text=True)  # noqa: S603
-    if process.returncode != 0:
-        sys.exit(f"The engine cannot be built (hatchling builds it): {process.stderr.strip()}")
+    words = ("build", "-t", "wheel", "-d", str(folder.absolute()))
+    _run("hatchling", *words, what="The engine (hatchling builds it)")
     (wheel,) = folder.glob("semsig_gis-*.whl")
     return wheel
 

@@ -1,98 +1,83 @@
-"""The base class of the algorithms, which calls the command, and their common parameters."""
+"""The algorithm of a tool, made from the schema of its command."""
 
 from __future__ import annotations
 
 import html
 import re
 import shlex
-from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
-    QgsProcessing,
     QgsProcessingAlgorithm,
-    QgsProcessingContext,
     QgsProcessingException,
-    QgsProcessingLayerPostProcessorInterface,
     QgsProcessingParameterDefinition,
-    QgsProcessingParameterEnum,
-    QgsProcessingParameterFeatureSink,
-    QgsProcessingParameterFile,
-    QgsProcessingParameterFileDestination,
-    QgsProcessingParameterNumber,
-    QgsProcessingParameterVectorDestination,
-    QgsProcessingParameterVectorLayer,
-    QgsVectorLayer,
 )
-from qgis.PyQt.QtGui import QIcon, QPainter
+from qgis.PyQt.QtGui import QIcon
 
 from . import settings
 from .answers import log_text
-from .arguments import check_output
+from .arguments import check_output, command_line, parameter_kinds
 from .command import Cancelled, CommandError, Watcher, run_command
-from .results import move_to_group
+from .parameters import NEW, make_parameters, new_file, read_option
+from .results import add_layers, show_layers
+from .tools import STEPS, make_tools, tool_options
 from .translation import tr
 
 if TYPE_CHECKING:
-    from qgis.core import QgsProcessingFeedback, QgsProject
+    from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
-    Definitions = tuple[QgsProcessingParameterDefinition, ...]
+    from .tools import Extra, Tool
 
-__all__ = [
-    "REGIONS",
-    "SemsigAlgorithm",
-    "add_layers",
-    "advanced",
-    "area",
-    "choice",
-    "database",
-    "described",
-    "file_to_read",
-    "file_to_write",
-    "keep_style",
-    "layers_to_write",
-    "load_style",
-    "map_to_write",
-    "number",
-    "show_layers",
-    "style_layer",
-    "whole_number",
-]
+__all__ = ["SemsigAlgorithm"]
 
-HERE = Path(__file__).parent
-PARQUET = "GeoParquet (*.parquet)"
-REGIONS = "Regions to search"
-"""Title of the layer of regions."""
-# How the paths of layers that are not in a file begin, such as memory: (but not C: of Windows).
-NO_FILE = re.compile(r"\w\w+:")
+PRINTED = "OUT"
+"""Parameter of the file for the text that a command prints."""
 
 
 class SemsigAlgorithm(QgsProcessingAlgorithm):
-    """An algorithm that runs the command; subclasses define its names, parameters and work."""
+    """The algorithm of a tool.
 
-    NAME = ""
-    TITLE = ""
-    HELP = ""
-    TAGS: tuple[str, ...] = ()
+    Parameters
+    ----------
+    tool : Tool
+        The tool.
+    commands : dict
+        The schema of each command.
+    """
+
+    def __init__(self, tool: Tool, commands: dict[str, dict[str, Any]]) -> None:
+        super().__init__()
+        self.tool, self.commands = tool, commands
+        self.command = commands[tool.command]
+        self.options = tool_options(tool, self.command)
 
     # The names of these methods are those of QGIS.
 
     def createInstance(self) -> SemsigAlgorithm:  # noqa: N802
         """Return a new instance."""
-        return type(self)()
+        return type(self)(self.tool, self.commands)
 
     def name(self) -> str:
         """Return the second part of the identifier."""
-        return self.NAME
+        return self.tool.name
 
     def displayName(self) -> str:  # noqa: N802
-        """Return the name in the toolbox."""
-        return tr(self.TITLE)
+        """Return the name in the toolbox, with the number of a main step."""
+        title, name = tr(self.tool.title or self.command["title"]), self.tool.name
+        return f"{STEPS.index(name) + 1}. {title}" if name in STEPS else title
+
+    def group(self) -> str:
+        """Return the name of the group in the toolbox."""
+        return tr(self.command["group"])
+
+    def groupId(self) -> str:  # noqa: N802
+        """Return the identifier of the group."""
+        return str(self.command["group"]).lower()
 
     def tags(self) -> list[str]:
-        """Return more words for the search in the toolbox."""
-        return list(self.TAGS)
+        """Return more words for the search in the toolbox: those of the English help."""
+        return sorted(set(re.findall(r"\w{4,}", self._help().lower())))
 
     def icon(self) -> QIcon:
         """Return the icon."""
@@ -102,18 +87,38 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         """Return the path of the icon."""
         return settings.icon_path()
 
+    def _help(self) -> str:
+        return self.tool.help.strip() or str(self.command["description"])
+
     def shortHelpString(self) -> str:  # noqa: N802
         """Return the help of the tool and of its parameters, in HTML."""
         parts = [
+            *(html.escape(self._shown(part)) for part in self._help().split("\n\n")),
             *(
-                tr(" ".join(part.split())) for part in self.HELP.split("\n\n")
-            ),  # line breaks would be shown
-            *(
-                f"<b>{parameter.description()}</b><br>{html.escape(parameter.help())}"
+                f"<b>{html.escape(parameter.description())}</b><br>{html.escape(parameter.help())}"
                 for parameter in self.parameterDefinitions()
+                if parameter.help()
             ),
         ]
         return "".join(f"<p>{part}</p>" for part in parts)
+
+    def _shown(self, text: str) -> str:
+        """Return a translated text with the titles of commands and options for their names."""
+        request = self.command["request"]["properties"]
+        titles = {option["x-flag"]: tr(option["title"]) for option in request.values()}
+        tools = make_tools(self.commands)
+
+        def command_title(found: re.Match[str]) -> str:
+            if found[1] not in tools:
+                return found[0]
+            title = SemsigAlgorithm(tools[found[1]], self.commands).displayName()
+            return tr("“{}”").format(title)
+
+        def option_title(found: re.Match[str]) -> str:
+            return tr("“{}”").format(titles[found[0]]) if found[0] in titles else found[0]
+
+        text = re.sub(r"`semsig ([\w-]+)[^`]*`", command_title, tr(" ".join(text.split())))
+        return re.sub(r"--[a-z][a-z-]*", option_title, text)
 
     def canExecute(self) -> tuple[bool, str]:  # noqa: N802
         """Whether the command exists, and what to do if not."""
@@ -124,13 +129,29 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         return True, ""
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Add the parameters."""
-        for parameter in self.definitions():
+        """Add the parameters: those of the options, inputs first, and those of more files."""
+        required = self.command["request"]["required"]
+        written = {name for name, option in self.options.items() if "x-writes" in option}
+        for name in sorted(self.options, key=lambda name: name in written):
+            option = self.options[name]
+            # The default of a file to write is in the folder where the command is started.
+            needed = name in required or (name in written and option["default"] is not None)
+            text = self._shown(option["description"])
+            if "x-default" in option:
+                text += " " + tr("Default: {}.").format(self._shown(option["x-default"]))
+            for parameter in make_parameters(name, option, required=needed, text=text):
+                self.addParameter(parameter)
+        if self.tool.printed:
+            title = tr("File to write")
+            self.addParameter(new_file("new file", PRINTED, title, [self.tool.printed]))
+        for name, extra in self.tool.extras.items():
+            kind = "layers" if extra.suffix == ".gpkg" else "new file"
+            parameter = new_file(kind, name, tr(extra.title), [extra.suffix], created=False)
+            optional = QgsProcessingParameterDefinition.Flag.FlagOptional
+            parameter.setFlags(parameter.flags() | optional)
+            options = self.commands[extra.command]["request"]["properties"]
+            parameter.setHelp(self._shown(options["out"]["description"]))
             self.addParameter(parameter)
-
-    def definitions(self) -> Definitions:
-        """Return the parameters, inputs first."""
-        raise NotImplementedError
 
     def processAlgorithm(  # noqa: N802
         self,
@@ -138,41 +159,91 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
-        """Run the algorithm; raise QgsProcessingException with one sentence if it fails."""
+        """Run the commands; raise QgsProcessingException with one sentence if they fail."""
         try:
-            self._check_outputs(parameters, context)
-            return self.work(parameters, context, feedback)
+            return self._run(parameters, context, feedback)
         except CommandError as error:
             raise QgsProcessingException(str(error)) from error
         except Cancelled:
             message = "Cancelled; no file is half-written."
             raise QgsProcessingException(message) from None
 
-    def work(
+    def _run(
         self,
         parameters: dict[str, Any],
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
-        """Run the command and return the outputs by their names."""
-        raise NotImplementedError
-
-    def _check_outputs(self, parameters: dict[str, Any], context: QgsProcessingContext) -> None:
-        """Raise CommandError before the work if an output cannot be written."""
-        for output in self.destinationParameterDefinitions():
-            if isinstance(output, QgsProcessingParameterFeatureSink):
-                path = self.sink_file(parameters, output.name(), context)
-                suffix = Path(path).suffix[1:].lower()  # QGIS writes many formats
-            else:
-                path = self.file_out(parameters, output.name(), context)
-                suffix = output.defaultFileExtension()
+        """Run the commands, show their layers, and return the outputs by their names."""
+        run = (self, parameters, context, feedback)
+        values = {**self.tool.fixed}
+        values |= {name: read_option(name, option, run) for name, option in self.options.items()}
+        if self.tool.command == "fetch" and values["catalog"] == "openstreetmap":
+            values["server"] = values.get("server") or settings.value(settings.OVERPASS)
+        written = {
+            parameter: path
+            for name, option in self.options.items()
+            for parameter, kind in parameter_kinds(name, option).items()
+            if kind in NEW and (path := values[name])
+        }
+        more = {
+            name: str(
+                self.parameterAsOutputLayer(parameters, name, context)
+                if extra.suffix == ".gpkg"
+                else self.parameterAsFileOutput(parameters, name, context)
+            )
+            for name, extra in self.tool.extras.items()
+        }
+        if self.tool.printed:
+            more[PRINTED] = str(self.parameterAsFileOutput(parameters, PRINTED, context))
+        suffixes = {name.upper(): option.get("x-writes") for name, option in self.options.items()}
+        suffixes |= {name: [extra.suffix] for name, extra in self.tool.extras.items()}
+        for name, path in {**written, **more}.items():
             if path:
-                check_output(path, suffix)
+                check_output(path, suffixes.get(name) or [self.tool.printed])
+        line = command_line(self.tool.command, self.command, values)
+        first = next((path for path in written.values() if Path(path).suffix), None)
+        printed = self._call(line, feedback, first)
+        feedback.pushConsoleInfo(log_text(printed))
+        if self.tool.printed:
+            Path(more[PRINTED]).parent.mkdir(parents=True, exist_ok=True)
+            Path(more[PRINTED]).write_text(printed, encoding="utf-8")
+        for name, extra in self.tool.extras.items():
+            if more[name]:
+                self._write_extra(extra, values, more[name], feedback)
+        outputs = {**written, **more}
+        if self.tool.layers:
+            folder = next(iter(written.values()))
+            add_layers(context, str(Path(folder, self.tool.layers)), group=self._legend_group())
+        for name, path in outputs.items():
+            if path.endswith(".gpkg"):
+                outputs[name] = show_layers(context, path, group=self._legend_group())
+        # Not every source has buildings and streets, whose files are missing then.
+        return {
+            name: path
+            for name, path in outputs.items()
+            if path and Path(path.partition("|")[0]).exists()
+        }
 
-    def call(
-        self, arguments: list[str], feedback: QgsProcessingFeedback, written: str | None = None
+    def _legend_group(self) -> str:
+        """Return the title of the group for the layers."""
+        return tr(self.tool.title or self.command["title"])
+
+    def _write_extra(
+        self, extra: Extra, values: dict[str, Any], path: str, feedback: QgsProcessingFeedback
+    ) -> None:
+        """Write one more file, with another command."""
+        given = {
+            name: values[value[1:].lower()] if str(value).startswith("=") else value
+            for name, value in extra.values.items()
+        }
+        line = command_line(extra.command, self.commands[extra.command], {**given, "out": path})
+        feedback.pushConsoleInfo(log_text(self._call(line, feedback, path)))
+
+    def _call(
+        self, arguments: list[str], feedback: QgsProcessingFeedback, written: str | None
     ) -> str:
-        """Run the command, which may write a file, and return its standard output."""
+        """Run a command, which may write a file, and return its standard output."""
         last_label = ""
 
         def progress(percent: int, label: str) -> None:
@@ -187,322 +258,3 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         return run_command(
             [settings.command(), *arguments], settings.environment(), watcher, written=written
         )
-
-    def execute(
-        self, arguments: list[str], feedback: QgsProcessingFeedback, written: str | None = None
-    ) -> None:
-        """Run the command, which may write a file, and show its standard output in the log."""
-        feedback.pushConsoleInfo(log_text(self.call(arguments, feedback, written)))
-
-    def file(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
-        """Return the path of a file to read; empty if not set."""
-        return str(self.parameterAsFile(parameters, name, context))
-
-    def file_out(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
-        """Return the path of a file to write; empty if not set."""
-        return str(self.parameterAsFileOutput(parameters, name, context))
-
-    def sink_file(
-        self, parameters: dict[str, Any], name: str, context: QgsProcessingContext
-    ) -> str:
-        """Return the path of a layer that QGIS itself writes; empty if it is not in a file."""
-        path = self.file_out(parameters, name, context)
-        return "" if NO_FILE.match(path) else path
-
-    def text(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
-        """Return the choice or text of a parameter; empty if not set."""
-        definition = self.parameterDefinition(name)
-        if isinstance(definition, QgsProcessingParameterEnum):
-            return str(self.parameterAsEnumString(parameters, name, context))
-        return str(self.parameterAsString(parameters, name, context)).strip()
-
-    def polygons(
-        self,
-        parameters: dict[str, Any],
-        name: str,
-        context: QgsProcessingContext,
-        feedback: QgsProcessingFeedback,
-    ) -> str:
-        """Return the path of a file with the polygons of a layer; empty if not set."""
-        if self.parameterAsVectorLayer(parameters, name, context) is None:
-            return ""
-        # Not GeoPackages: the command does not know which of their layers to read.
-        formats = ["shp", "geojson"]
-        return str(
-            self.parameterAsCompatibleSourceLayerPath(
-                parameters, name, context, formats, "gpkg", feedback
-            )
-        )
-
-
-def show_layers(
-    context: QgsProcessingContext, path: str, titles: dict[str, str], *, group: str
-) -> str:
-    """Show the layers of a GeoPackage, if the user wants to see the file.
-
-    Parameters
-    ----------
-    context : QgsProcessingContext
-        Contains the file if it is to be shown.
-    path : str
-        The file.
-    titles : dict of str to str
-        Titles of its layers, by their names.
-    group : str
-        Title of the group for the layers.
-
-    Returns
-    -------
-    str
-        The source of the first layer, in the notation of QGIS.
-    """
-    layers = context.layersToLoadOnCompletion()
-    details = layers.pop(path, None)
-    if details is not None:
-        context.setLayersToLoadOnCompletion(layers)
-        add_layers(context, path, titles, group=group, project=details.project)
-    return _source(path, next(iter(titles)))
-
-
-def add_layers(
-    context: QgsProcessingContext,
-    path: str,
-    titles: dict[str, str],
-    *,
-    group: str,
-    project: QgsProject | None = None,
-) -> None:
-    """Show the layers of a GeoPackage.
-
-    Parameters
-    ----------
-    context : QgsProcessingContext
-        The context of the run.
-    path : str
-        The file.
-    titles : dict of str to str
-        Titles of its layers by their names, the lowest first.
-    group : str
-        Title of the group for the layers.
-    project : QgsProject, optional
-        The project that shows them; the project of the context by default.
-    """
-    project = project or context.project()
-    if project is None:  # there is no window
-        return
-    for layer, title in titles.items():
-        details = QgsProcessingContext.LayerDetails(tr(title), project, title)
-        details.setPostProcessor(_styler(group=group))
-        context.addLayerToLoadOnCompletion(_source(path, layer), details)
-
-
-def _source(path: str, layer: str) -> str:
-    """Return the source of a layer of a GeoPackage, in the notation of QGIS."""
-    # QGIS loads layers in alphabetical order of these texts, each above the one before. It ignores
-    # the case of the key, and capitals come first, so lines are loaded below points.
-    word = "LAYERNAME" if layer.endswith("_lines") else "layername"
-    return f"{path}|{word}={layer}"
-
-
-class _Styler(QgsProcessingLayerPostProcessorInterface):
-    """Applies a style to a layer after it is loaded: from the plugin, or from its GeoPackage."""
-
-    def __init__(self, name: str, group: str) -> None:
-        super().__init__()
-        self.name, self.group = name, group
-
-    def postProcessLayer(  # noqa: N802
-        self,
-        layer: QgsVectorLayer,
-        _context: QgsProcessingContext,
-        _feedback: QgsProcessingFeedback,
-    ) -> None:
-        """Apply the style, since Processing does not load the default one."""
-        # The layer may be in the project already, with the previous version of the file open.
-        layer.dataProvider().reloadData()
-        if self.name:
-            load_style(layer, self.name)
-        else:
-            layer.loadDefaultStyle()
-        if layer.name() == tr(REGIONS):  # layers below stay visible
-            layer.setBlendMode(QPainter.CompositionMode.CompositionMode_Multiply)
-        layer.triggerRepaint()
-        move_to_group(layer.id(), self.group)
-
-
-def _styler(name: str = "", *, group: str) -> _Styler:
-    """Return a styler for one layer, and keep a reference, since QGIS does not."""
-    styler = _Styler(name, tr(group).lstrip("0123456789. "))
-    _STYLERS.append(styler)
-    return styler
-
-
-# More than there are layers at a time; QGIS deletes stylers after use.
-_STYLERS: deque[_Styler] = deque(maxlen=1000)
-
-
-def style_layer(context: QgsProcessingContext, source: str, style: str, *, group: str) -> None:
-    """Apply a style of the plugin to a layer, if the user wants to see it.
-
-    Parameters
-    ----------
-    context : QgsProcessingContext
-        Contains the layer if it is to be shown.
-    source : str
-        The layer.
-    style : str
-        Name of the style's file, without its suffix.
-    group : str
-        Title of the group for the layer.
-    """
-    if context.willLoadLayerOnCompletion(source):
-        context.layerToLoadOnCompletionDetails(source).setPostProcessor(_styler(style, group=group))
-
-
-def keep_style(source: str, style: str) -> None:
-    """Write a style of the plugin into the GeoPackage of a layer, if it is in one.
-
-    Parameters
-    ----------
-    source : str
-        The layer.
-    style : str
-        Name of the style's file, without its suffix.
-    """
-    layer = QgsVectorLayer(source, style, "ogr")
-    if layer.storageType() == "GPKG":  # a temporary layer is in no file
-        load_style(layer, style)
-        layer.saveStyleToDatabase(style, "", True, "")  # noqa: FBT003 - as QGIS calls it
-
-
-def load_style(layer: QgsVectorLayer, style: str) -> None:
-    """Apply a style of the plugin to a layer.
-
-    Parameters
-    ----------
-    layer : QgsVectorLayer
-        The layer.
-    style : str
-        Name of the style's file, without its suffix.
-    """
-    layer.loadNamedStyle(str(HERE / "styles" / f"{style}.qml"))
-
-
-def described(
-    parameter: QgsProcessingParameterDefinition, text: str
-) -> QgsProcessingParameterDefinition:
-    """Return a parameter with its help."""
-    parameter.setHelp(tr(text))
-    parameter.setDescription(tr(parameter.description()))
-    return parameter
-
-
-def advanced(parameter: QgsProcessingParameterDefinition) -> QgsProcessingParameterDefinition:
-    """Return a parameter that is shown under "Advanced"."""
-    parameter.setFlags(parameter.flags() | QgsProcessingParameterDefinition.Flag.FlagAdvanced)
-    return parameter
-
-
-def file_to_read(
-    name: str, title: str, text: str, *, kind: str = PARQUET, optional: bool = False
-) -> QgsProcessingParameterFile:
-    """Return the parameter for a file."""
-    parameter = QgsProcessingParameterFile(
-        name,
-        title,
-        behavior=QgsProcessingParameterFile.Behavior.File,
-        optional=optional,
-        fileFilter=f"{kind};;All files (*)",
-    )
-    return described(parameter, text)
-
-
-def database() -> QgsProcessingParameterFile:
-    """Return the parameter for a signature database."""
-    return file_to_read(
-        "DATABASE",
-        "Signature database",
-        "The file that “Build signature database” wrote.",
-    )
-
-
-def area(text: str) -> QgsProcessingParameterVectorLayer:
-    """Return the parameter for polygons."""
-    parameter = QgsProcessingParameterVectorLayer(
-        "AREA", "Area", types=[QgsProcessing.SourceType.TypeVectorPolygon], optional=True
-    )
-    return described(parameter, text)
-
-
-def choice(
-    name: str, title: str, options: tuple[str, ...], text: str, *, default: str | None = None
-) -> QgsProcessingParameterEnum:
-    """Return the parameter for a choice of names; the first is the default."""
-    parameter = QgsProcessingParameterEnum(
-        name,
-        title,
-        options=list(options),
-        defaultValue=options[0] if default is None else default,
-        usesStaticStrings=True,
-    )
-    return described(parameter, text)
-
-
-def number(
-    name: str, title: str, default: float | None, bounds: tuple[float, float], text: str
-) -> QgsProcessingParameterNumber:
-    """Return the parameter for a number, optional if it has no default."""
-    parameter = QgsProcessingParameterNumber(
-        name,
-        title,
-        type=QgsProcessingParameterNumber.Type.Double,
-        defaultValue=default,
-        optional=default is None,
-        minValue=bounds[0],
-        maxValue=bounds[1],
-    )
-    parameter.setMetadata({"widget_wrapper": {"decimals": 1 if bounds[1] > 1 else 2}})
-    return described(parameter, text)
-
-
-def whole_number(
-    name: str, title: str, default: int, bounds: tuple[int, int], text: str
-) -> QgsProcessingParameterNumber:
-    """Return the parameter for a whole number."""
-    parameter = QgsProcessingParameterNumber(
-        name,
-        title,
-        type=QgsProcessingParameterNumber.Type.Integer,
-        defaultValue=default,
-        minValue=bounds[0],
-        maxValue=bounds[1],
-    )
-    return described(parameter, text)
-
-
-def file_to_write(
-    name: str, title: str, text: str, *, kind: str = PARQUET, optional: bool = False
-) -> QgsProcessingParameterFileDestination:
-    """Return the parameter for a file to write; an optional file is not written by default."""
-    parameter = QgsProcessingParameterFileDestination(
-        name, title, fileFilter=kind, optional=optional, createByDefault=not optional
-    )
-    return described(parameter, text)
-
-
-def map_to_write(text: str) -> QgsProcessingParameterFileDestination:
-    """Return the parameter for a map page."""
-    return file_to_write("MAP", "Map page", text, kind="Web page (*.html)", optional=True)
-
-
-def layers_to_write(
-    name: str, title: str, text: str, *, optional: bool = False
-) -> QgsProcessingParameterVectorDestination:
-    """Return the parameter for a GeoPackage of layers."""
-    parameter = QgsProcessingParameterVectorDestination(
-        name,
-        title,
-        type=QgsProcessing.SourceType.TypeVectorAnyGeometry,
-        optional=optional,
-    )
-    return described(parameter, text)

@@ -1,134 +1,182 @@
-"""Make command lines of `semsig` from the values of parameters, without QGIS."""
+"""Make command lines of `semsig` from the schema of its commands, without QGIS."""
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
-from typing import Union
+from typing import Any
 
 from .command import CommandError
 
 __all__ = [
-    "CATALOGS",
-    "DISTORTIONS",
-    "LIKELIHOOD",
-    "METHODS",
-    "METHOD_HELP",
-    "NOISES",
-    "SERVICES",
+    "KINDS_OF_ONE",
     "check_output",
     "command_line",
-    "require_likelihood",
+    "option_words",
+    "parameter_kinds",
+    "read_commands",
+    "value_schema",
 ]
 
-CATALOGS = (
-    "barcelona",
-    "hamburg",
-    "mapillary",
-    "melbourne",
-    "montpellier",
-    "new_york",
-    "opendata_paris",
-    "openstreetmap",
-    "overture",
-    "vienna",
-    "washington",
-)
-FILES_ONLY = ("montpellier",)
-SERVICES = tuple(name for name in CATALOGS if name not in FILES_ONLY)
-"""Catalogues with a service to download from."""
-LIKELIHOOD = "likelihood"
-METHODS = (
-    LIKELIHOOD,
-    "edit+edit",
-    "edit+edit:5%",
-    "histogram+histogram",
-    "jaccard+jaccard",
-    "types:edit",
-    "angles:edit",
-)
-METHOD_HELP = (
-    "How cells are compared with a query. likelihood: by the chance that a detector sees the query"
-    " from there. edit+edit: by the number of objects to add, remove or exchange to change one "
-    "sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % "
-    "of the cells with the best types. histogram+histogram: by how often each type and each angle "
-    "occurs, in any order. jaccard+jaccard: by which types and which angles occur at all. "
-    "types:edit and angles:edit: as edit+edit, by only the types or only the angles."
-)
-NOISES = ("generic", "light", "medium", "strong", "by-hand", "photo", "panorama")
-DISTORTIONS = ("none", "light", "medium", "strong")
-
-Value = Union[str, float, bool, None, "list[str]"]
+HERE = Path(__file__).parent
+KINDS_OF_ONE = {"extent": "extent", "text": "name", "file": "file", "polygons": "polygons"}
+"""Words for the parameters of an option that has several, by their kinds."""
+BOX = "WEST,SOUTH,EAST,NORTH"
 
 
-def command_line(command: str, *arguments: str, **options: Value) -> list[str]:
+def read_commands() -> dict[str, dict[str, Any]]:
+    """Return the schema of each command by its name, as `semsig schema` printed it."""
+    content = (HERE / "commands.json").read_text("utf-8")
+    return json.loads(content)["commands"]  # type: ignore[no-any-return]
+
+
+def value_schema(option: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of the value of an option that may be null.
+
+    Parameters
+    ----------
+    option : dict
+        A property of the request of a command.
+
+    Returns
+    -------
+    dict
+        The schema of one value; that of a list for a list.
+    """
+    alternatives = option.get("anyOf", [option])
+    return next(schema for schema in alternatives if schema["type"] != "null")
+
+
+def parameter_kinds(  # noqa: PLR0911 - a kind each
+    name: str, option: dict[str, Any]
+) -> dict[str, str]:
+    """Return the parameters for an option, their kinds by their names.
+
+    Parameters
+    ----------
+    name : str
+        Name of the option in the request.
+    option : dict
+        Its schema.
+
+    Returns
+    -------
+    dict
+        Usually one parameter: the name in upper case. An option that takes a box, a file or a
+        text, or a name or a file, has a parameter for each.
+
+    Examples
+    --------
+    >>> area = {"type": "string", "x-metavar": "WEST,SOUTH,EAST,NORTH|FILE"}
+    >>> parameter_kinds("area", area)
+    {'AREA': 'polygons', 'AREA_EXTENT': 'extent'}
+    """
+    name = name.strip("_").upper()
+    schema, metavar = value_schema(option), option.get("x-metavar", "")
+    many = "items" in schema
+    schema = schema.get("items", schema)
+    if "x-writes" in option:
+        kinds = {".gpkg": "layers", ".tif": "raster", "": "new folder"}
+        return {name: kinds.get(option["x-writes"][0], "new file")}
+    if schema["type"] == "boolean":
+        return {name: "yes or no" if "anyOf" in option else "switch"}
+    if "enum" in schema:
+        return {name: "choices" if many else "choice"}
+    if schema["type"] != "string" and not many:
+        return {name: schema["type"]}
+    if metavar == "CRS":
+        return {name: "crs"}
+    if metavar.startswith(BOX):
+        others = set(metavar.split("|"))
+        return {
+            **({name: "polygons"} if "FILE" in others else {}),
+            f"{name}_EXTENT": "extent",
+            **({f"{name}_TEXT": "text"} if others - {BOX, "CANVAS", "FILE"} else {}),
+        }
+    if not option.get("x-reads"):
+        many_kind = "choices" if option.get("x-suggestions") else "lines"
+        return {name: many_kind if many else "text"}
+    if option.get("x-suggestions"):
+        return {name: "choices" if many else "choice", f"{name}_FILE": "file"}
+    if metavar == "FOLDER":
+        return {name: "folder"}
+    return {name: "files" if many else "file"}
+
+
+def option_words(option: dict[str, Any], value: Any) -> list[str]:  # noqa: ANN401 - any value
+    """Return the words of a command line for the value of an option.
+
+    Parameters
+    ----------
+    option : dict
+        Its schema.
+    value : str, float, bool, list or None
+        The value. None, an empty text or list, and the default give no words.
+
+    Returns
+    -------
+    list of str
+        The words.
+
+    Examples
+    --------
+    >>> option_words({"x-flag": "--merge", "default": True}, False)
+    ['--no-merge']
+    """
+    flag = option["x-flag"]
+    if value is None or value in ("", []) or value == option.get("default"):
+        return []
+    if isinstance(value, bool):
+        return [flag if value else flag.replace("--", "--no-", 1)]
+    values = value if isinstance(value, list) else [value]
+    return [str(item) if option.get("x-positional") else f"{flag}={item}" for item in values]
+
+
+def command_line(name: str, command: dict[str, Any], values: dict[str, Any]) -> list[str]:
     """Return the arguments of a command.
 
     Parameters
     ----------
-    command : str
+    name : str
         Such as ``"build"``.
-    *arguments : str
-        Arguments without a name: the files that the command takes.
-    **options : str, float, bool, list of str or None
-        Options by name, without the dashes and with ``_`` for ``-``. An empty value or None is
-        left out, True is an option without a value, and a list repeats the option.
+    command : dict
+        Its schema.
+    values : dict
+        Values of its options.
 
     Returns
     -------
     list of str
         The arguments.
 
-    Examples
-    --------
-    >>> command_line("build", "objects.parquet", out="city.parquet", step=10.0, area=None)
-    ['build', '--out=city.parquet', '--step=10.0', '--', 'objects.parquet']
-    """
-    line: list[str] = []
-    for name, value in options.items():
-        option = "--" + name.rstrip("_").replace("_", "-")
-        if value is True:
-            line.append(option)
-        elif isinstance(value, list):
-            line += [f"{option}={item}" for item in value]
-        elif value is not None and value is not False and value != "":
-            line.append(f"{option}={value}")
-    # Files after the two dashes are never read as options, whatever their names.
-    return [command, *line, "--", *arguments]
-
-
-def require_likelihood(method: str, parameter: str) -> None:
-    """Raise an error if a parameter of the likelihood method is given with another method.
-
-    Parameters
-    ----------
-    method : str
-        The chosen method.
-    parameter : str
-        The name of the parameter in the dialog.
-
     Raises
     ------
     CommandError
-        If it is another method.
+        If an option that is required has no value.
     """
-    if method != LIKELIHOOD:
-        message = (
-            f"{parameter} was given with the method {method}, which does not have it; choose the "
-            f"method {LIKELIHOOD}, or leave it out."
-        )
-        raise CommandError(message)
+    request = command["request"]
+    named: list[str] = []
+    positional: list[str] = []
+    for key, option in request["properties"].items():
+        words = option_words(option, values.get(key))
+        if not words and key in request["required"]:
+            message = f"{option['title']} was not given; choose it, or type it."
+            raise CommandError(message)
+        (positional if option.get("x-positional") else named).extend(words)
+    # Words after the two dashes are never read as options, whatever they are.
+    return [name, *named, "--", *positional]
 
 
-def check_output(path: str, suffix: str) -> None:
+def check_output(path: str, suffixes: list[str]) -> None:
     """Raise an error before the work if an output cannot be written.
 
     Parameters
     ----------
     path : str
         The file or folder to write. Missing folders are created by the command.
-    suffix : str
-        The suffix of the file without the dot; empty for a folder.
+    suffixes : list of str
+        The suffixes that the file may have; an empty one accepts any, also a folder.
 
     Raises
     ------
@@ -136,15 +184,18 @@ def check_output(path: str, suffix: str) -> None:
         If it cannot be written.
     """
     target = Path(path)
-    if suffix and target.suffix.lower() != f".{suffix}":
-        message = f"{path} does not end in .{suffix}; give the name of a .{suffix} file."
-        raise CommandError(message)
-    if suffix and os.path.isdir(target):  # noqa: PTH112 - Path.is_dir may raise
-        message = f"{path} is a folder; give the name of a file to write."
-        raise CommandError(message)
-    # Find the nearest folder that exists; a folder to write may exist itself.
-    absolute = target.absolute()
-    places = [*absolute.parents] if suffix else [absolute, *absolute.parents]
+    if "" not in suffixes:
+        if target.suffix.lower() not in suffixes:
+            listed = " or ".join(suffixes)
+            message = f"{path} does not end in {listed}; give the name of a {listed} file."
+            raise CommandError(message)
+        if os.path.isdir(target):  # noqa: PTH112 - Path.is_dir may raise
+            message = f"{path} is a folder; give the name of a file to write."
+            raise CommandError(message)
+    # Find the nearest folder that exists; what is written may exist itself.
+    places = [target.absolute().parent, *target.absolute().parents]
+    if suffixes == [""]:
+        places.insert(0, target.absolute())
     existing = (place for place in places if os.path.exists(place))  # noqa: PTH110 - as above
     folder = next(existing, places[-1])
     if not folder.is_dir():

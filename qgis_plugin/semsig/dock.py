@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import tempfile
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
@@ -32,10 +35,9 @@ from qgis.PyQt.QtWidgets import (
     QWidget,
 )
 
-from .algorithm import load_style
-from .answers import percent
+from .answers import doubt, percent
 from .compass_dial import CompassDial, Mark, Sign, sign_icon
-from .results import WGS84, show_answer
+from .results import replace_answer
 from .server import CityServer
 from .translation import tr
 
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SemsigDock"]
 
+WGS84 = "EPSG:4326"
 LAST_DATABASE = "semsig/database"
 """The setting with the last opened database."""
 CELL_COLOUR, LOOKALIKE_COLOUR = QColor("#d55e00"), QColor("#0072b2")
@@ -73,6 +76,8 @@ class SemsigDock(QgsDockWidget):
         self.candidates: list[dict[str, Any]] = []
         self.bands: list[QgsRubberBand] = []
         self.tool: QgsMapToolEmitPoint | None = None
+        self.answers = tempfile.TemporaryDirectory(prefix="semsig")
+        self.answered = 0  # number of answers, each in a file of its own
         self._create_widgets()
         self.server.failed.connect(self.message.setText)
         self._lay_out_widgets()
@@ -325,9 +330,10 @@ class SemsigDock(QgsDockWidget):
         compass = [{"class": mark.kind, "bearing": mark.bearing, "range": None} for mark in marks]
         error = "unknown" if self.north.isChecked() else None
         view = {"compass": compass, "heading_error": error, "step": None}
-        self.server.ask("answer", {"views": [view], "top": LOOKALIKES}, self._show_place)
+        question = {"views": [view], "top": LOOKALIKES}
+        self.server.ask("answer", question, partial(self._show_place, question))
 
-    def _show_place(self, answer: dict[str, Any]) -> None:
+    def _show_place(self, question: dict[str, Any], answer: dict[str, Any]) -> None:
         self._remove_highlights()
         verdict = (
             tr("Found: the place is within {metres} m with a chance of {chance}.")
@@ -340,12 +346,19 @@ class SemsigDock(QgsDockWidget):
         text = verdict.format(
             cells=f"{answer['region']['counts']['0.9']:,}",
             metres=f"{answer['radius']:g}",
-            chance=percent(answer["mass"]),
+            chance=percent(answer["mass"], tr),
         )
-        self._list(answer, f"{text} {answer['doubt']}".rstrip())
+        self._list(answer, f"{text} {doubt(answer, tr)}".rstrip())
         self.message.setText(tr("Choose a rank in the list to go there."))
-        show_answer(answer, load_style)
         self._go_to([candidate["place"] for candidate in self.candidates[:3]])
+        self.server.ask("export?format=gpkg", question, self._show_layers)
+
+    def _show_layers(self, content: bytes) -> None:
+        """Show the layers of an answer from the content of its GeoPackage."""
+        self.answered += 1
+        file = Path(self.answers.name, f"answer{self.answered}.gpkg")
+        file.write_bytes(content)
+        replace_answer(str(file))
 
     def _list(self, answer: dict[str, Any], verdict: str) -> None:
         """Show the candidates of an answer in the table."""
@@ -354,7 +367,7 @@ class SemsigDock(QgsDockWidget):
         self.table.blockSignals(True)  # noqa: FBT003 - as Qt calls it
         self.table.setRowCount(len(self.candidates))
         for row, candidate in enumerate(self.candidates):
-            texts = str(candidate["rank"]), percent(candidate["chance"]), candidate["types"]
+            texts = str(candidate["rank"]), percent(candidate["chance"], tr), candidate["types"]
             for column, text in enumerate(texts):
                 item = QTableWidgetItem(text)
                 if column < 2:  # noqa: PLR2004 - the numbers
@@ -391,6 +404,8 @@ class SemsigDock(QgsDockWidget):
         if self.tool is not None:
             self.canvas.unsetMapTool(self.tool)
         self.server.close()
+        with contextlib.suppress(OSError):  # a layer may have its file open
+            self.answers.cleanup()
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:

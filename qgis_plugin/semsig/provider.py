@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from pkgutil import iter_modules
-
 from qgis.core import QgsProcessingProvider
 from qgis.PyQt.QtGui import QIcon
 
-from . import settings, tools
+from . import settings
+from .algorithm import SemsigAlgorithm
+from .arguments import read_commands
+from .tools import make_tools
 
 __all__ = ["SemsigProvider"]
 
@@ -47,12 +47,10 @@ class SemsigProvider(QgsProcessingProvider):
         settings.remove_settings()
 
     def loadAlgorithms(self) -> None:  # noqa: N802
-        """Add the algorithms, which are the classes in `__all__` of the modules in `tools`."""
-        for _, name, _ in iter_modules(tools.__path__):
-            module = import_module(f"{tools.__name__}.{name}")
-            for member in map(vars(module).get, module.__all__):
-                if isinstance(member, type):
-                    self.addAlgorithm(member())
+        """Add an algorithm for each tool."""
+        commands = read_commands()
+        for tool in make_tools(commands).values():
+            self.addAlgorithm(SemsigAlgorithm(tool, commands))
 
     def defaultVectorFileExtension(self, _hasGeometry: bool = True) -> str:  # noqa: N802, N803, FBT001, FBT002
         """Return the suffix of layers by default."""

@@ -1,47 +1,52 @@
-"""Show the answers of the dock as layers of the project, in a group."""
+"""Show the layers of GeoPackages in the project, with the styles that are stored in them."""
 
 from __future__ import annotations
 
+import contextlib
+import sqlite3
+from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
-    QgsFeature,
-    QgsGeometry,
-    QgsPointXY,
+    QgsProcessingContext,
+    QgsProcessingLayerPostProcessorInterface,
     QgsProject,
     QgsVectorLayer,
 )
 from qgis.PyQt.QtCore import QTimer
 from qgis.PyQt.QtGui import QPainter
 
-from .answers import CANDIDATE_FIELDS, PLACE_FIELDS
 from .translation import tr
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from qgis.core import QgsLayerTreeGroup, QgsProcessingFeedback
 
-    from qgis.core import QgsLayerTreeGroup
+__all__ = ["add_layers", "replace_answer", "show_layers"]
 
-__all__ = ["group_of", "move_to_group", "show_answer"]
-
-WGS84 = "EPSG:4326"
+BLENDED = ("regions",)
+"""Layers of areas through which the layers below stay visible."""
 KEY = "semsig"
-"""Custom property of the layers of the plugin."""
+"""Custom property of the layers of the dock."""
+LOWEST = 3
 
 
-def group_of(title: str) -> QgsLayerTreeGroup:
-    """Return the group with a title; create it above all layers if it is missing.
+def _titles(path: str) -> dict[str, str]:
+    """Return the titles of the layers of a GeoPackage by their names; none if it is missing."""
+    query = "SELECT table_name, identifier FROM gpkg_contents WHERE data_type = 'features'"
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        try:
+            return dict(connection.execute(query))
+        except sqlite3.Error:
+            return {}
 
-    Parameters
-    ----------
-    title : str
-        The title.
 
-    Returns
-    -------
-    QgsLayerTreeGroup
-        The group.
-    """
+def _source(path: str, name: str) -> str:
+    """Return the source of a layer of a GeoPackage, in the notation of QGIS."""
+    return f"{path}|layername={name}"
+
+
+def _group_of(title: str) -> QgsLayerTreeGroup:
+    """Return the group with a title; create it above all layers if it is missing."""
     root = QgsProject.instance().layerTreeRoot()
     group = root.findGroup(title)
     if group is None:
@@ -50,33 +55,10 @@ def group_of(title: str) -> QgsLayerTreeGroup:
     return group
 
 
-def move_to_group(identifier: str, title: str) -> None:
-    """Move a layer into a group, after QGIS has added it to the layer tree.
-
-    Parameters
-    ----------
-    identifier : str
-        Identifier of the layer.
-    title : str
-        Title of the group.
-    """
-
-    def move() -> None:
-        node = QgsProject.instance().layerTreeRoot().findLayer(identifier)
-        group = None if node is None else group_of(title)
-        if node is None or group is None or node.parent() == group:
-            return
-        # Insert the layer above the layers of its height and below the others.
-        height = _height(node.layer())
-        layers = [child.layer() for child in group.findLayers()]
-        number = sum(1 for layer in layers if layer is None or _height(layer) < height)
-        group.insertChildNode(number, node.clone())
-        node.parent().removeChildNode(node)
-
-    QTimer.singleShot(0, move)
-
-
-LOWEST = 3
+def _place_in_group(group: QgsLayerTreeGroup, layer: Any) -> int:  # noqa: ANN401 - any layer
+    """Return the place of a layer in a group: above layers of its height, below the others."""
+    layers = [child.layer() for child in group.findLayers()]
+    return sum(1 for item in layers if item is None or _height(item) < _height(layer))
 
 
 def _height(layer: Any) -> float:  # noqa: ANN401 - any kind of layer
@@ -88,88 +70,124 @@ def _height(layer: Any) -> float:  # noqa: ANN401 - any kind of layer
         return LOWEST + 1
     kind = layer.geometryType()
     height = min(int(getattr(kind, "value", kind)), LOWEST)
-    if layer.blendMode() == QPainter.CompositionMode.CompositionMode_SourceOver:
-        return height
-    return height + 0.5
+    plain = QPainter.CompositionMode.CompositionMode_SourceOver
+    return height if layer.blendMode() == plain else height + 0.5
 
 
-def show_answer(answer: dict[str, Any], load_style: Any) -> None:  # noqa: ANN401 - a function
-    """Show an answer of the workbench as two layers, which replace the previous answer.
+def _move_to_group(identifier: str, title: str) -> None:
+    """Move a layer into a group, after QGIS has added it to the layer tree."""
+
+    def move() -> None:
+        node = QgsProject.instance().layerTreeRoot().findLayer(identifier)
+        group = None if node is None else _group_of(title)
+        if node is None or group is None or node.parent() == group:
+            return
+        group.insertChildNode(_place_in_group(group, node.layer()), node.clone())
+        node.parent().removeChildNode(node)
+
+    QTimer.singleShot(0, move)
+
+
+def _apply_style(layer: QgsVectorLayer) -> None:
+    """Apply the style that is stored in the GeoPackage of a layer."""
+    layer.loadDefaultStyle()
+    if layer.source().endswith(tuple(f"|layername={name}" for name in BLENDED)):
+        layer.setBlendMode(QPainter.CompositionMode.CompositionMode_Multiply)
+    layer.triggerRepaint()
+
+
+class _Styler(QgsProcessingLayerPostProcessorInterface):
+    """Applies its style to a layer after it is loaded, and moves it into a group."""
+
+    def __init__(self, group: str) -> None:
+        super().__init__()
+        self.group = group
+
+    def postProcessLayer(  # noqa: N802 - as QGIS calls it
+        self,
+        layer: QgsVectorLayer,
+        _context: QgsProcessingContext,
+        _feedback: QgsProcessingFeedback,
+    ) -> None:
+        """Apply the style, since Processing does not load the default one."""
+        # The layer may be in the project already, with the previous version of the file open.
+        layer.dataProvider().reloadData()
+        _apply_style(layer)
+        _move_to_group(layer.id(), self.group)
+
+
+# QGIS does not keep a reference, and deletes stylers after use: more than there are at a time.
+_STYLERS: deque[_Styler] = deque(maxlen=1000)
+
+
+def show_layers(context: QgsProcessingContext, path: str, *, group: str) -> str:
+    """Show the layers of a GeoPackage, if the user wants to see the file.
 
     Parameters
     ----------
-    answer : dict
-        See `semsig_gis.output.answer_drawing`.
-    load_style : callable
-        Called with a layer and the name of its style.
+    context : QgsProcessingContext
+        Contains the file if it is to be shown.
+    path : str
+        The file.
+    group : str
+        Title of the group for the layers.
+
+    Returns
+    -------
+    str
+        The source of the first layer, in the notation of QGIS.
     """
-    estimate = answer["estimate"]
-    ring = [QgsPointXY(lon, lat) for lat, lon in estimate["ellipse"]]
-    place = {
-        "answered": "yes" if answer["given"] else "cannot tell",
-        "chance": answer["mass"],
-        "within_m": answer["radius"],
-        "sigma_m": estimate["sigma"],
-        "heading": estimate["heading"],
-        "elsewhere": answer["elsewhere"],
-        "fit": answer["fit"],
-    }
-    rows: list[tuple[QgsGeometry, dict[str, Any]]] = []
-    for candidate in answer["candidates"]:
-        lat, lon = candidate["place"]
-        values = {
-            "rank": candidate["rank"],
-            "rank_high": candidate["rank"],
-            "cell_id": candidate["cell_id"],
-            "types": candidate["types"],
-            "length": candidate["length"],
-            "chance": candidate["chance"],
-        }
-        rows.append((QgsGeometry.fromPointXY(QgsPointXY(lon, lat)), values))
-    polygon = QgsGeometry.fromPolygonXY([ring])
-    for name, title, kind, fields, contents in (
-        ("place", tr("Place"), "Polygon", PLACE_FIELDS, [(polygon, place)]),
-        ("candidates", tr("Candidates"), "Point", CANDIDATE_FIELDS, rows),
-    ):
-        layer = _layer(name, title, kind, fields, load_style)
-        _fill(layer, contents)
-    group_of(tr("Answer")).setExpanded(True)
+    layers = context.layersToLoadOnCompletion()
+    details = layers.pop(path, None)
+    if details is not None:
+        context.setLayersToLoadOnCompletion(layers)
+        add_layers(context, path, group=group, project=details.project)
+    return _source(path, next(iter(_titles(path)), ""))
 
 
-def _layer(
-    name: str,
-    title: str,
-    kind: str,
-    fields: dict[str, str],
-    load_style: Any,  # noqa: ANN401
-) -> QgsVectorLayer:
-    """Return the existing layer of an answer, or a new one in the group of answers."""
+def add_layers(
+    context: QgsProcessingContext, path: str, *, group: str, project: QgsProject | None = None
+) -> None:
+    """Show the layers of a GeoPackage.
+
+    Parameters
+    ----------
+    context : QgsProcessingContext
+        The context of the run.
+    path : str
+        The file.
+    group : str
+        Title of the group for the layers.
+    project : QgsProject, optional
+        The project that shows them; the project of the context by default.
+    """
+    project = project or context.project()
+    if project is None:  # there is no window
+        return
+    for name, title in _titles(path).items():
+        details = QgsProcessingContext.LayerDetails(tr(title), project, title)
+        styler = _Styler(group)
+        _STYLERS.append(styler)
+        details.setPostProcessor(styler)
+        context.addLayerToLoadOnCompletion(_source(path, name), details)
+
+
+def replace_answer(path: str) -> None:
+    """Show the layers of an answer of the dock, in place of those of the previous answer.
+
+    Parameters
+    ----------
+    path : str
+        Its GeoPackage.
+    """
     project = QgsProject.instance()
-    for layer in project.mapLayers().values():
-        if layer.customProperty(KEY) == name:
-            return layer
-    query = "&".join(f"field={field}:{type_}" for field, type_ in fields.items())
-    layer = QgsVectorLayer(f"{kind}?crs={WGS84}&{query}", title, "memory")
-    layer.setCustomProperty(KEY, name)
-    layer.setCustomProperty("skipMemoryLayersCheck", 1)
-    load_style(layer, name)
-    project.addMapLayer(layer, False)  # noqa: FBT003 - as QGIS calls it: not into the tree
-    group_of(tr("Answer")).insertLayer(0, layer)
-    return layer
-
-
-def _fill(layer: QgsVectorLayer, contents: Iterable[tuple[QgsGeometry, dict[str, Any]]]) -> None:
-    """Replace the features of a layer."""
-    provider = layer.dataProvider()
-    provider.truncate()
-    features = []
-    for geometry, values in contents:
-        feature = QgsFeature(layer.fields())
-        feature.setGeometry(geometry)
-        for name, value in values.items():
-            if value is not None:
-                feature.setAttribute(name, value)
-        features.append(feature)
-    provider.addFeatures(features)
-    layer.updateExtents()
-    layer.triggerRepaint()
+    project.removeMapLayers(
+        [name for name, layer in project.mapLayers().items() if layer.customProperty(KEY)]
+    )
+    group = _group_of(tr("Answer"))
+    for name, title in _titles(path).items():
+        layer = QgsVectorLayer(_source(path, name), tr(title), "ogr")
+        layer.setCustomProperty(KEY, name)
+        _apply_style(layer)
+        project.addMapLayer(layer, False)  # noqa: FBT003 - as QGIS calls it: not into the tree
+        group.insertLayer(_place_in_group(group, layer), layer)

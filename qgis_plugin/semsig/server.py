@@ -102,9 +102,7 @@ class CityServer(QObject):
             self.messages[-1].removeprefix(SENTENCE) if self.messages else tr("The engine ended.")
         )
 
-    def ask(
-        self, what: str, question: dict[str, Any] | None, then: Callable[[dict[str, Any]], None]
-    ) -> None:
+    def ask(self, what: str, question: dict[str, Any] | None, then: Callable[[Any], None]) -> None:
         """Send a request, and pass the answer on when it arrives.
 
         Parameters
@@ -114,7 +112,8 @@ class CityServer(QObject):
         question : dict or None
             The body of the request, if it has one.
         then : callable
-            Called with the answer. An error is emitted by `failed` instead.
+            Called with the answer: the values of JSON, or the content of another file. An error
+            is emitted by `failed` instead.
         """
         if not self.address:
             self.failed.emit(tr("Open a database first."))
@@ -128,10 +127,15 @@ class CityServer(QObject):
             reply = self.network.post(request, json.dumps(question).encode())
         reply.finished.connect(lambda: self._read(reply, then))
 
-    def _read(self, reply: QNetworkReply, then: Callable[[dict[str, Any]], None]) -> None:
+    def _read(self, reply: QNetworkReply, then: Callable[[Any], None]) -> None:
         reply.deleteLater()
+        content = bytes(reply.readAll())
+        kind = str(reply.header(QNetworkRequest.KnownHeaders.ContentTypeHeader) or "")
+        if content and kind and "json" not in kind:
+            then(content)
+            return
         try:
-            answer = json.loads(bytes(reply.readAll()).decode())
+            answer = json.loads(content.decode())
         except ValueError:
             self.failed.emit(tr("The engine did not answer."))
             return

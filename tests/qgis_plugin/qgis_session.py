@@ -17,6 +17,7 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingOutputLayerDefinition,
+    QgsProcessingParameterDefinition,
     QgsProject,
     QgsRenderContext,
 )
@@ -58,7 +59,7 @@ class Feedback(QgsProcessingFeedback):
     def reportError(self, error: str, fatalError: bool = False) -> None:  # noqa: ARG002, FBT001, FBT002, N802, N803
         self.errors.append(error)
 
-    def pushInfo(self, info: str) -> None:  # noqa: N802
+    def pushConsoleInfo(self, info: str) -> None:  # noqa: N802
         self.infos.append(info)
 
     def setProgressText(self, text: str) -> None:  # noqa: N802
@@ -97,7 +98,7 @@ def run_ok(name: str, **parameters: Any) -> Feedback:  # noqa: ANN401
     """Run an algorithm on the database, which must succeed."""
     feedback = run(name, DATABASE=DATABASE, **parameters)
     if not feedback.ended[0]:
-        raise RuntimeError(feedback.errors)
+        raise RuntimeError([name, *feedback.errors])
     return feedback
 
 
@@ -106,35 +107,55 @@ def shown(place: str = TEMPORARY) -> QgsProcessingOutputLayerDefinition:
     return QgsProcessingOutputLayerDefinition(place, QgsProject.instance())
 
 
-def layer_contents() -> dict[str, Any]:
-    """Return rows, extent and columns of all layers of the project, by name."""
-    layers: dict[str, Any] = {}
-    for layer in QgsProject.instance().mapLayers().values():
-        rows = len(list(layer.getFeatures()))
-        facts = [rows, layer.extent().toString(), layer.fields().names()]
-        layers.setdefault(layer.name(), []).append(facts)
-    return layers
+def described(parameter: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Return what the dialog shows of a parameter."""
+    flags, names = parameter.flags(), QgsProcessingParameterDefinition.Flag
+    details = {name: getattr(parameter, name, lambda: None)() for name in ("minimum", "maximum")}
+    return details | {
+        "kind": parameter.type(),
+        "title": parameter.description(),
+        "help": parameter.help(),
+        "default": parameter.defaultValue(),
+        "choices": parameter.options() if parameter.type() == "enum" else [],
+        "optional": bool(flags & names.FlagOptional),
+        "advanced": bool(flags & names.FlagAdvanced),
+    }
+
+
+def tools() -> dict[str, Any]:
+    """Return title, group, help and parameters of each algorithm."""
+    provider = QgsApplication.processingRegistry().providerById("semsig")
+    return {
+        item.name(): {
+            "title": item.displayName(),
+            "group": item.group(),
+            "help": item.shortHelpString(),
+            "parameters": {
+                parameter.name(): described(parameter) for parameter in item.parameterDefinitions()
+            },
+        }
+        for item in provider.algorithms()
+    }
 
 
 def show_twice() -> dict[str, Any]:
-    """Write the same files twice while their layers are shown; return both contents."""
-    layers = {}
-    regions = str(PLACE / "regions.gpkg")
-    # The layer has the name of its file, which contains another layer as well.
-    area = f"{regions}|layername=regions"
-    files = {
-        "CANDIDATES": shown(str(PLACE / "new" / "candidates.gpkg")),
-        "PLACE": shown(),
-        "REGIONS": shown(regions),
-    }
+    """Write the same file twice while its layers are shown; return both contents."""
+    contents = {}
+    answer = str(PLACE / "new" / "answer.gpkg")
+    # The layer has the name of its file, which contains other layers as well.
+    area = f"{answer}|layername=regions"
     for time_, query in (
         ("first", {"TYPES": "D", "TOP": 20, "METHOD": "edit+edit"}),
         ("second", {"TYPES": "DDB", "TOP": 3, "SHARE": 0.5, "AREA": area}),
     ):
-        feedback = run_ok("localize", **files, **query)
-        layers[time_] = {**layer_contents(), "infos": feedback.infos}
+        feedback = run_ok("localize", OUT=shown(answer), **query)
+        layers = {
+            layer.name(): [len(list(layer.getFeatures())), layer.extent().toString()]
+            for layer in QgsProject.instance().mapLayers().values()
+        }
+        contents[time_] = {"layers": layers, "log": "\n".join(feedback.infos)}
     QgsProject.instance().clear()
-    return layers
+    return contents
 
 
 def show(query: dict[str, str]) -> dict[str, Any]:
@@ -143,21 +164,19 @@ def show(query: dict[str, str]) -> dict[str, Any]:
     def file(name: str) -> str:
         return str(PLACE / name)
 
-    places = {name: shown(file(f"{name}.gpkg")) for name in ("CANDIDATES", "PLACE", "REGIONS")}
-    run_ok("localize", TOP=3, METHOD="likelihood", MAP=file("place.html"), **places, **query)
+    run_ok("localize", TOP=3, MAP=file("place.html"), OUT=shown(file("answer.gpkg")), **query)
     evaluated = run_ok(
         "evaluate",
         QUERIES=20,
-        DISTORTION="light",
-        MORE="compass:5",
+        DISTORTION="light,compass:5",
         METHOD="edit+edit",
-        OUTPUT=file("evaluation"),
+        OUT=file("evaluation"),
         LAYERS=shown(file("evaluation.gpkg")),
         MAP=file("evaluation.html"),
     )
     cells = shown(file("cells.gpkg"))
     identified = run_ok("identify", NOISE="light", CELLS=cells, MAP=file("cells.html"))
-    run_ok("export", OBJECTS=file("objects.parquet"), OUTPUT=shown())
+    run_ok("export", OBJECTS=file("objects.parquet"), OUT=shown())
     layers = QgsProject.instance().mapLayers().values()
     renderers = {
         layer.name(): [layer.renderer().type(), *layer.renderer().usedAttributes(EVERYWHERE)]
@@ -177,17 +196,17 @@ def groups() -> dict[str, list[str]]:
 
 
 def others() -> dict[str, Any]:
-    """Run the tools without a number, except the downloads."""
+    """Run other tools, except the downloads."""
     tiff, toml = str(PLACE / "ambiguity.tif"), str(PLACE / "draft.toml")
     updated, objects = str(PLACE / "updated.parquet"), str(PLACE / "objects.parquet")
-    run_ok("ambiguity", OUTPUT=tiff, MAP=str(PLACE / "ambiguity.html"))
-    run("update", DATABASE=str(PLACE / "city.parquet"), OBJECTS=objects, OUTPUT=updated)
-    run_ok("draft", FILE=str(PLACE / "lamps.geojson"), OUTPUT=toml)
-    run_ok("demo", OUTPUT=str(PLACE / "demo"), QUERIES=5)
-    nowhere = run("fetch", OUTPUT=str(PLACE / "nowhere.parquet")).errors
+    run_ok("ambiguity", OUT=tiff, MAP=str(PLACE / "ambiguity.html"))
+    run("update", DATABASE=str(PLACE / "city.parquet"), OBJECTS=objects, OUT=updated)
+    run_ok("draft", FILE=str(PLACE / "lamps.geojson"), OUT=toml)
+    run_ok("demo", OUT=str(PLACE / "demo"), QUERIES=5)
+    info = "\n".join(run_ok("info").infos)
     existing = {path.name for path in PLACE.iterdir()}
     expected = {"ambiguity.tif", "ambiguity.html", "updated.parquet", "draft.toml", "demo"}
-    return {"missing": sorted(expected - existing), "nowhere": nowhere, "groups": groups()}
+    return {"missing": sorted(expected - existing), "info": info, "groups": groups()}
 
 
 def translations() -> dict[str, list[str]]:
@@ -206,21 +225,21 @@ def translations() -> dict[str, list[str]]:
 def refuse() -> list[list[str]]:
     """Return the errors of runs with invalid parameters."""
     objects, later = str(PLACE / "objects.parquet"), str(PLACE / "later.parquet")
-    area = f"{PLACE / 'regions.gpkg'}|layername=regions"
-    query = {"TYPES": "DDB", "METHOD": "types:edit", "CANDIDATES": shown()}
+    area = f"{PLACE / 'answer.gpkg'}|layername=regions"
+    query = {"TYPES": "DDB", "METHOD": "types:edit", "OUT": shown()}
     errors = []
     for name, parameters in (
         ("localize", {**query, "HEADING": "unknown", "AREA": area}),
-        ("localize", {**query, "PLACE": str(PLACE / "place.gpkg")}),
-        ("evaluate", {"METHOD": "edit+edit", "NOISE": "light", "OUTPUT": TEMPORARY}),
-        ("build", {"OBJECTS": objects, "OUTPUT": later, "CELLS": str(PLACE / "b.shp")}),
+        ("localize", {**query, "AREA": area, "AREA_EXTENT": "0,1,0,1 [EPSG:4326]"}),
+        ("build", {"OBJECTS": objects, "OUT": later, "CELLS": str(PLACE / "b.shp")}),
         ("identify", {"CELLS": shown(), "MAP": str(PLACE / "map.json")}),
-        ("evaluate", {"OUTPUT": TEMPORARY, "LAYERS": str(PLACE / "lamps.geojson" / "b.gpkg")}),
+        ("evaluate", {"OUT": TEMPORARY, "LAYERS": str(PLACE / "lamps.geojson" / "b.gpkg")}),
+        ("fetch", {"NAME": "openstreetmap", "OUT": str(PLACE / "nowhere.parquet")}),
     ):
-        database: dict[str, Any] = {} if name == "build" else {"DATABASE": DATABASE}
+        database: dict[str, Any] = {} if name in {"build", "fetch"} else {"DATABASE": DATABASE}
         errors.append(run(name, **database, **parameters).errors)
     ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "/bin/true")
-    return [*errors, run("build", OBJECTS=objects, OUTPUT=later).errors]
+    return [*errors, run("build", OBJECTS=objects, OUT=later).errors]
 
 
 def stop(name: str, **parameters: Any) -> dict[str, Any]:  # noqa: ANN401
@@ -239,21 +258,17 @@ def stop(name: str, **parameters: Any) -> dict[str, Any]:  # noqa: ANN401
 
 def play() -> dict[str, Any]:
     """Run all parts, and return their results."""
-    registry = QgsApplication.processingRegistry()
-    provider = registry.providerById("semsig")
-    listed = sorted((item.displayName(), item.name()) for item in provider.algorithms())
     objects = str(PLACE / "objects.parquet")
     lamps, loaded = [str(PLACE / "lamps.geojson")], str(PLACE / "session_lamps.parquet")
-    cancelled = {"OUTPUT": str(PLACE / "cancelled.parquet"), "CELLS": shown()}
+    cancelled = {"OUT": str(PLACE / "cancelled.parquet"), "CELLS": shown()}
     results = {
-        "listed": [name for _, name in listed],
-        "help": algorithm("localize").shortHelpString(),
-        "loaded": run("load", FILES=lamps, CATALOG_FILE=sys.argv[2], OUTPUT=loaded).ended[0],
+        "tools": tools(),
+        "loaded": run("load", FILES=lamps, CATALOG_FILE=sys.argv[2], OUT=loaded).ended[0],
         **show_twice(),
         **show(json.loads(sys.argv[3])),
         "groups": groups(),
         "order": [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()],
-        "failed": stop("export", DATABASE=objects, OUTPUT=str(PLACE / "fails.gpkg")),
+        "failed": stop("export", DATABASE=objects, OUT=str(PLACE / "fails.gpkg")),
         "cancelled": stop(
             "build", cancelling=True, OBJECTS=objects, STEP=1.0, RADIUS=100.0, **cancelled
         ),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
 import sys
 import time
@@ -12,12 +10,9 @@ from pathlib import Path
 
 import pytest
 import typer
-from hypothesis import given
-from hypothesis import strategies as st
 from machine import PATIENCE_S
-from semsig import answers, arguments
-from semsig.answers import answer_lines, candidate_rows, parse_answer, place_row, ring
-from semsig.arguments import check_output, command_line, require_likelihood
+from semsig.answers import doubt
+from semsig.arguments import check_output, command_line
 from semsig.command import (
     Cancelled,
     CommandError,
@@ -30,10 +25,9 @@ from sentences import refused
 
 from semsig_gis.cli.app import app
 from semsig_gis.cli.console import VARIABLE
-from semsig_gis.core import DEFAULT_METHOD
-from semsig_gis.evaluation import parse_chain
-from semsig_gis.localization import METRICS, NOISES, Method
-from semsig_gis.sources import catalog_names, load_catalog
+from semsig_gis.commands import commands
+from semsig_gis.commands.schema import command_schema
+from semsig_gis.localization.answers import doubt_sentence
 
 unix = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are shell scripts")
 
@@ -240,35 +234,24 @@ def test_error_in_a_watcher_ends_the_command() -> None:
 
 def test_command_line_quotes_any_value() -> None:
     nasty = ["--out=x", "-", "--", "a b", "=", "é \u202e'\"`$(x)\\", "*", "\n"]
-    line = command_line(
-        "load", *nasty, catalog=nasty, out=nasty[0], crs=nasty[5], layer=[], filter=True, merge=None
-    )
+    command = command_schema(commands()["load"])
+    values = {"files": nasty, "catalog": nasty, "out": nasty[0], "crs": nasty[5], "layer": []}
+    line = command_line("load", command, {**values, "filter": False, "merge": True})
     assert line[0] == "load"
     load = typer.main.get_command(app).commands["load"]  # type: ignore[attr-defined]
-    values = load.make_context("load", line[1:]).params
-    assert [str(path) for path in values["files"]] == values["catalog"] == nasty
-    assert (str(values["out"]), values["crs"]) == (nasty[0], nasty[5])
-    assert values["filter"] is True
-    assert not values["layer"]
+    parsed = load.make_context("load", line[1:]).params
+    assert [str(path) for path in parsed["files"]] == parsed["catalog"] == nasty
+    assert (str(parsed["out"]), parsed["crs"]) == (nasty[0], nasty[5])
+    assert (parsed["filter"], parsed["merge"]) == (False, True)
+    assert not parsed["layer"]
+    with refused(CommandError, "Files was not given"):
+        command_line("load", command, {"out": "objects.parquet"})
 
 
-def test_names_match_the_command() -> None:
-    assert set(arguments.CATALOGS) == set(catalog_names())
-    services = {name for name in catalog_names() if load_catalog(name).endpoints}
-    assert set(arguments.SERVICES) == services
-    assert set(arguments.NOISES) == set(NOISES)
-    assert arguments.METHODS[0] == DEFAULT_METHOD  # the default of the dialog
-    for method in arguments.METHODS:
-        assert method == arguments.LIKELIHOOD or str(Method.parse(method))
-    fusions = {method for method in arguments.METHODS if "+" in method and ":" not in method}
-    # The dialog offers some of the metrics; each needs a sentence in three languages.
-    assert fusions <= {f"{name}+{name}" for name in METRICS}
-    assert all(fusion in arguments.METHOD_HELP for fusion in fusions)
-    for name in arguments.DISTORTIONS:
-        assert parse_chain(name)
-    require_likelihood("likelihood", "Place")
-    with refused(CommandError, "Place", "types:edit", "choose the method likelihood"):
-        require_likelihood("types:edit", "Place")
+@pytest.mark.parametrize("elsewhere", [0.0, 0.0999, 0.1, 0.5, 0.999])
+@pytest.mark.parametrize("fit", [None, 0.0, 0.00999, 0.01, 0.7])
+def test_doubts_are_those_of_the_command(elsewhere: float, fit: float | None) -> None:
+    assert doubt({"elsewhere": elsewhere, "fit": fit}) == doubt_sentence(elsewhere, fit)
 
 
 def test_outputs_are_checked_before_the_work(
@@ -277,83 +260,21 @@ def test_outputs_are_checked_before_the_work(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "text").write_text("a file")
     (tmp_path / "folder.gpkg").mkdir()
-    for path, suffix in (("a.gpkg", "gpkg"), (f"{tmp_path}/new/folder/A.GPKG", "gpkg"),
+    for path, suffix in (("a.gpkg", ".gpkg"), (f"{tmp_path}/new/folder/A.GPKG", ".gpkg"),
                          ("new/folder", ""), (str(tmp_path), "")):  # fmt: skip
-        check_output(path, suffix)
+        check_output(path, [suffix])
+    check_output("new/tiles", [".parquet", ""])
     for path, suffix, words in (
-        ("b.shp", "gpkg", "does not end in .gpkg"),
-        ("gpkg", "gpkg", "does not end in .gpkg"),
-        ("folder.gpkg", "gpkg", "is a folder"),
-        ("text/b.gpkg", "gpkg", "text is not a folder"),
+        ("b.shp", ".gpkg", "does not end in .gpkg"),
+        ("gpkg", ".gpkg", "does not end in .gpkg"),
+        ("folder.gpkg", ".gpkg", "is a folder"),
+        ("text/b.gpkg", ".gpkg", "text is not a folder"),
         ("text/deep/results", "", "text is not a folder"),
         ("text", "", "text is not a folder"),
     ):
         with refused(CommandError, path, words):
-            check_output(path, suffix)
+            check_output(path, [suffix])
     monkeypatch.setattr("semsig.arguments.os.access", lambda _path, _mode: False)
-    for path, suffix in (("b.gpkg", "gpkg"), ("new/folder", "")):
+    for path, suffix in (("b.gpkg", ".gpkg"), ("new/folder", "")):
         with refused(CommandError, path, f"{tmp_path} is read-only"):
-            check_output(path, suffix)
-
-
-@given(
-    centre=st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)),
-    shorter=st.floats(1.0, 50.0),
-    stretch=st.floats(1.0, 5.0),
-    bearing=st.floats(0.0, 180.0),
-)
-def test_ring_has_the_axes_and_centre_of_the_ellipse(
-    centre: tuple[float, float], shorter: float, stretch: float, bearing: float
-) -> None:
-    corners = ring(centre, shorter * stretch, shorter, bearing)
-    assert corners[0] == corners[-1]
-    distances = [math.dist(centre, corner) for corner in corners]
-    assert max(distances) == pytest.approx(shorter * stretch, rel=1e-6)
-    assert min(distances) == pytest.approx(shorter, rel=1e-6)
-    far = corners[distances.index(max(distances))]
-    direction = math.degrees(math.atan2(far[0] - centre[0], far[1] - centre[1]))
-    if stretch > 1.01:
-        assert math.cos(2 * math.radians(direction - bearing)) == pytest.approx(1, abs=1e-6)
-
-
-def test_candidate_rows_match_their_fields() -> None:
-    common = {"cell_id": 7, "types": "DD", "length": 2, "x": 1.0, "y": 2.0}
-    ranked = {**common, "rank_low": 1, "rank_high": 20, "distance": 0.3}
-    likely = {**common, "rank": 2, "chance": 0.5}
-    values = zip(*(row[2] for row in candidate_rows({"candidates": [ranked, likely]})), strict=True)
-    columns = dict(zip(answers.CANDIDATE_FIELDS, values, strict=True))
-    assert (columns["rank"], columns["rank_high"]) == ((1, 2), (20, 2))
-    assert (columns["chance"], columns["distance"]) == ((None, 0.5), (0.3, None))
-    assert place_row({"candidates": []}) is None
-
-
-def test_answer_lines_report_ties_place_and_regions() -> None:
-    ranked = {"candidates": [{"rank_high": 1}], "tied_beyond": 1}
-    assert answer_lines(ranked) == [
-        "The best cell ties with no other.",
-        "1 further cell ties with the last candidate.",
-    ]
-    searched = {"regions": 1, "cells": 13, "km2": 0.0013, "percent": 0.00493, "chance": 0.951}
-    place = {"within_m": 50.0, "chance": 0.05}
-    region = {"text": "90 % region: 13 cells, 1,300 m², in 2 places"}
-    placed = {"answered": False, "doubt": "It is foggy.", "region": region, "place": place}
-    placed |= {"candidates": [], "searched": searched}
-    assert answer_lines(placed) == [
-        "Cannot tell. 90 % region: 13 cells, 1,300 m², in 2 places.",
-        "It is foggy.",
-        "The best place is within 50 m of the ellipse's middle: chance 5 %.",
-        "To search: 1 region, 0.0013 km2, 0.00493 % of the city, with 95 % of the chance.",
-    ]
-    del searched["chance"]
-    ranked = {"candidates": [{"rank_high": 1200}], "tied_beyond": 0, "searched": searched}
-    assert answer_lines(ranked) == [
-        "The best 1,200 cells share the ranks 1 to 1,200.",
-        "To search: 1 region, 0.0013 km2, 0.00493 % of the city.",
-    ]
-
-
-@pytest.mark.parametrize("printed", ["", "{}", "[]", "3", '{"crs": 1}', "{"])
-def test_output_that_is_not_an_answer_is_an_error(printed: str) -> None:
-    with refused(CommandError, "same version"):
-        parse_answer(printed)
-    assert parse_answer(json.dumps({"crs": "EPSG:2154", "candidates": []}))["crs"] == "EPSG:2154"
+            check_output(path, [suffix])

@@ -16,21 +16,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import geopandas as gpd
 import pyogrio
 import pytest
 from machine import PATIENCE_S, qgis_variables, unavailable
+from semsig.arguments import KINDS_OF_ONE
+from semsig.tools import LEFT_OUT
 from small_city import small_city
 
 import semsig_gis
+from semsig_gis.commands import commands
+from semsig_gis.commands.schema import command_schema
 from semsig_gis.database import ObjectStore, open_database, save_with_store
 from semsig_gis.objects import open_objects, save_objects
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = ROOT / "qgis_plugin" / "semsig"
+LAYERS = ROOT / "semsig_gis" / "output" / "layers"
 SCRIPT = Path(__file__).with_name("qgis_session.py")
+LAYERS_OF_ANSWER = ("candidates", "place", "regions")
 DATA = Path(__file__).with_name("data")  # three lamps, and their catalogue
 
 # The command with few simulated queries.
@@ -62,7 +67,7 @@ def test_zip_file_is_reproducible_and_contains_the_plugin(
         assert names == sorted(names)
         assert {name.partition("/")[0] for name in names} == {"semsig"}
         assert {"semsig/__init__.py", "semsig/metadata.txt", "semsig/LICENSE"} <= set(names)
-        suffixes = {".py", ".txt", ".svg", ".qml", ".qm", ".md", ""}
+        suffixes = {".py", ".txt", ".svg", ".json", ".qm", ".md", ""}
         assert {Path(name).suffix for name in names} == suffixes
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         code = {name for name in names if name.endswith(".py")}
@@ -89,42 +94,56 @@ def test_official_repository_would_accept_the_zip_file(
     }
 
 
-def shown_texts() -> set[str]:
-    """Return all texts of the windows, the toolbox and the help of the tools."""
+def paragraphs(text: str) -> set[str]:
+    """Return the paragraphs of a text without line breaks, as they are shown."""
+    return {" ".join(part.split()) for part in text.strip().split("\n\n")}
+
+
+def schema_texts(command: dict[str, Any]) -> set[str]:
+    """Return the texts of a command and its options."""
+    texts = {command["title"], command["group"], *paragraphs(command["description"])}
+    for option in command["request"]["properties"].values():
+        texts |= {option["title"], option["description"]}
+        texts |= {option.get("x-default", ""), option.get("x-unit", "")}
+    return texts
+
+
+def code_texts(path: Path) -> set[str]:
+    """Return the texts in the code of the plugin, and the titles of layers."""
     texts: set[str] = set()
-    kinds = {"choice", "number", "whole_number", "layers_to_write", "file_to_read", "file_to_write"}
-    for path in PLUGIN.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            values: list[ast.expr] = []
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-                name = node.func.id
-                values += node.args[:1] if name in {"tr", "area", "map_to_write"} else []
-                if name in kinds:
-                    values += node.args[1:]
-                elif name == "described" or name.startswith("QgsProcessingParameter"):
-                    values += node.args[1:2]
-            elif isinstance(node, ast.Assign):
-                name = ast.unparse(node.targets[0])
-                if name in {"TITLE", "METHOD_HELP", "text"}:
-                    values.append(node.value)
-                elif name == "HELP":
-                    parts = str(ast.literal_eval(node.value)).split("\n\n")
-                    texts |= {" ".join(part.split()) for part in parts}
-                elif name == "OUTPUTS":
-                    texts |= {text for _, *shown in ast.literal_eval(node.value) for text in shown}
-            constants = [value.value for value in values if isinstance(value, ast.Constant)]
-            texts |= {text for text in constants if isinstance(text, str)}
-    return texts - {""}
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
+            continue
+        name, values = node.func.id, [*node.args[:1]] if node.args else []
+        keywords = [key for key in node.keywords if key.arg in {"title", "help"}]
+        if name.endswith(("layer", "Layer", "Tool")):
+            values = [key.value for key in keywords]
+        elif name not in {"tr", "Extra"}:
+            continue
+        for value in values:
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                texts |= paragraphs(value.value)
+    return texts
+
+
+def shown_texts() -> set[str]:
+    """Return all texts of the windows, the toolbox, its help and the titles of layers."""
+    schemas = [command_schema(item) for name, item in commands().items() if name not in LEFT_OUT]
+    files = [*PLUGIN.glob("*.py"), *LAYERS.glob("*.py")]
+    texts = {text for schema in schemas for text in schema_texts(schema)}
+    texts |= {text for path in files for text in code_texts(path)}
+    return texts - {""} | {*KINDS_OF_ONE.values()}
 
 
 @pytest.mark.parametrize("language", ["de", "fr"])
 def test_all_texts_are_translated(package: SimpleNamespace, language: str) -> None:
     file = ROOT / "qgis_plugin" / "i18n" / f"semsig_{language}.ts"
     translations = package.read_translations(file)
-    # The title of a layer, in a dictionary.
-    assert shown_texts() | {"From the true to the best place"} == set(translations)
+    assert shown_texts() == set(translations)
+    # Places for values, commands and options are the same in each language.
+    names = r"{\w*}|`semsig [^`]*`|(?<!\w)--[a-z][a-z-]*"
     for source, text in translations.items():
-        assert set(re.findall(r"{\w*}", source)) == set(re.findall(r"{\w*}", text)), text
+        assert set(re.findall(names, source)) == set(re.findall(names, text)), text
     # The header of Qt; the contents are tested in QGIS.
     assert package.compiled(translations)[:4] == bytes.fromhex("3cb86418")
 
@@ -168,14 +187,6 @@ def test_metadata_matches_the_package() -> None:
     assert general["qgisMinimumVersion"] == "3.22"
     assert general["hasProcessingProvider"] == "yes"
     assert (PLUGIN / general["icon"]).is_file()
-
-
-@pytest.mark.parametrize("path", [*PLUGIN.rglob("*.qml"), *PLUGIN.rglob("*.svg")], ids=str)
-def test_styles_and_icon_are_valid(path: Path) -> None:
-    root = ET.parse(path).getroot()  # noqa: S314 - our own file
-    symbols = {symbol.get("name") for symbol in root.iterfind("renderer-v2/symbols/symbol")}
-    used = {element.get("symbol") for element in root.iter() if element.get("symbol")}
-    assert used == symbols
 
 
 def test_plugin_has_the_syntax_of_python_3_9() -> None:
@@ -244,13 +255,13 @@ def qgis(
 
 def test_load_and_build_write_their_outputs(qgis: Qgis) -> None:
     objects = qgis.place / "lamps.parquet"
-    files = {"OUTPUT": objects, "BUILDINGS": qgis.place / "no_buildings.parquet"}
-    outputs = qgis.run("load", FOLDER=qgis.place, CATALOG_FILE=qgis.place / "town.toml", **files)
-    assert outputs == {"OUTPUT": str(objects)}
+    files = {"OUT": objects, "BUILDINGS": qgis.place / "no_buildings.parquet"}
+    outputs = qgis.run("load", FILES=qgis.place, CATALOG_FILE=qgis.place / "town.toml", **files)
+    assert outputs == {"OUT": str(objects)}
     assert len(open_objects(objects)) == 3
-    files = {"OUTPUT": qgis.place / "lamps_city.parquet", "CELLS": qgis.place / "lamps.gpkg"}
+    files = {"OUT": qgis.place / "lamps_city.parquet", "CELLS": qgis.place / "lamps.gpkg"}
     outputs = qgis.run("build", OBJECTS=objects, RADIUS=20, **files)
-    database = open_database(outputs["OUTPUT"])
+    database = open_database(outputs["OUT"])
     assert database.spec.radius == 20.0
     assert outputs["CELLS"] == f"{files['CELLS']}|layername=cells"
     assert len(gpd.read_file(files["CELLS"], layer="cells")) == len(database)
@@ -277,56 +288,90 @@ def session(qgis: Qgis, package: SimpleNamespace) -> dict[str, Any]:
     return results
 
 
-def test_algorithms_are_listed_and_files_are_loaded(session: dict[str, Any], qgis: Qgis) -> None:
-    six = ["load", "build", "localize", "evaluate", "identify", "export"]
-    others = ["ambiguity", "demo", "fetchcanvas", "fetch", "draft", "update"]
-    assert session["listed"] == [*six, *others]
+@pytest.mark.parametrize("name", sorted(set(commands()) - {*LEFT_OUT}))
+def test_parameters_are_those_of_the_schema(session: dict[str, Any], name: str) -> None:
+    command, tool = commands()[name], session["tools"][name]
+    assert (tool["title"].lstrip("1234. "), tool["group"]) == (command.title, command.group)
+    hidden = {"localize": {"more", "queries", "adapt"}}.get(name, set())
+    fields = [field for field in command.fields if field.name not in hidden]
+    parameters = dict(tool["parameters"])
+    for extra in {"build": ["CELLS"], "draft": ["OUT"], "evaluate": ["LAYERS", "MAP"],
+                  "identify": ["CELLS", "MAP"]}.get(name, []):  # fmt: skip
+        del parameters[extra]
+    for field in fields:
+        unit = f" ({field.option.unit})" if field.option.unit else ""
+        key = field.name.strip("_").upper()
+        names = [key, *(f"{key}_{part}" for part in ("EXTENT", "FILE", "TEXT"))]
+        shown = [parameters.pop(name) for name in names if name in parameters]
+        assert shown, field.name
+        for parameter in shown:
+            assert parameter["title"].partition(": ")[0] == field.title + unit
+            assert parameter["advanced"] == field.option.advanced
+            if len(shown) == 1 and field.option.writes is None:
+                assert parameter["optional"] != field.required
+        parameter = shown[0]
+        if field.kind in {int, float} and not field.many:
+            low, high = field.option.low, field.option.high
+            bounds = [low, None if high is None else min(high, 2**31 - 1)]
+            for bound, limit in zip(bounds, ("minimum", "maximum"), strict=True):
+                assert bound is None or parameter[limit] == bound
+        if field.choices:
+            assert parameter["choices"] == list(field.choices)
+        if not field.many and field.option.writes is None:
+            assert parameter["default"] == field.default
+    assert not parameters
+
+
+def test_tools_have_numbers_help_and_variants(session: dict[str, Any], qgis: Qgis) -> None:
+    tools = session["tools"]
+    numbered = {tool["title"][0]: name for name, tool in tools.items() if tool["title"][1] == "."}
+    assert numbered == {"1": "load", "2": "build", "3": "localize", "4": "evaluate"}
+    assert set(tools) == set(commands()) - {*LEFT_OUT} | {"ambiguity", "fetchcanvas"}
+    assert set(tools["fetchcanvas"]["parameters"]) == {"AREA_EXTENT", "OUT", "BUILDINGS", "STREETS"}
+    assert set(tools["ambiguity"]["parameters"]) == {"DATABASE", "OUT", "MAP"}
+    text = tools["localize"]["help"]
+    assert "“2. Build signature database”" in text
+    assert "?&lt;=10" in text
+    assert "--" not in re.sub(r"&\w+;", "", tools["build"]["help"])
     assert session["loaded"] is True
     assert len(open_objects(qgis.place / "session_lamps.parquet")) == 3
-    text = session["help"]
-    assert "<p>Finds where in the city a view was taken from: what is seen, clockwise" in text
-    assert "?&lt;=10" in text
 
 
 @pytest.mark.usefixtures("session")
 def test_answer_is_written_with_styles(qgis: Qgis) -> None:
     database, _ = small_city()
-    names = ("CANDIDATES", "PLACE", "REGIONS")
-    candidates, place, regions = (qgis.place / f"{name}.gpkg" for name in names)
-    for file, name in ((candidates, "candidates"), (place, "place")):
-        styles = gpd.read_file(file, layer="layer_styles")
-        assert styles["styleName"].tolist() == [name]
-        assert styles["useAsDefault"].all()
-    best, ellipse, area = (gpd.read_file(file, layer=0) for file in (candidates, place, regions))
+    file = qgis.place / "answer.gpkg"
+    styles = gpd.read_file(file, layer="layer_styles")
+    assert set(styles["f_table_name"]) == {*LAYERS_OF_ANSWER}
+    best, place, area = (gpd.read_file(file, layer=name) for name in LAYERS_OF_ANSWER)
     assert best["rank"].tolist() == [1, 2, 3]
     assert best["cell_id"][0] == database.cell_ids[database.lengths.argmax()]
     assert best["chance"].is_monotonic_decreasing
-    assert best["distance"].isna().all()
-    assert best.crs == database.crs
-    assert ellipse["answered"].tolist() == ["yes"]
     assert area.geometry[0].distance(best.geometry[0]) == 0
-    assert ellipse.geometry[0].centroid.distance(best.geometry[0]) < 10
+    assert place.geometry[0].distance(best.geometry[0]) < 10
     assert "<html" in (qgis.place / "place.html").read_text(encoding="utf-8")[:200].lower()
 
 
 def test_evaluation_is_written(session: dict[str, Any], qgis: Qgis) -> None:
     folder, layers, map_ = (qgis.place / f"evaluation{end}" for end in ("", ".gpkg", ".html"))
     outputs = session["evaluated"]
-    assert 0 < float(outputs["WITHIN_50_M"]) <= 1
     settings = json.loads((folder / "evaluation.json").read_text("utf-8"))["settings"]
     assert (settings["queries"], settings["distortions"]) == (20, ["light", "compass:5"])
-    assert outputs["LAYERS"] == f"{layers}|layername=evaluation"
+    assert outputs == {
+        "OUT": str(folder),
+        "LAYERS": f"{layers}|layername=evaluation",
+        "MAP": str(map_),
+    }
     assert len(gpd.read_file(layers, layer="evaluation")) == 20
-    assert outputs["MAP"] == str(map_)
     assert map_.is_file()
 
 
 def test_layers_are_shown_with_styles(session: dict[str, Any]) -> None:
     assert session["shown"] == {
         "Candidates": ["graduatedSymbol", "rank"],
-        "Place": ["categorizedSymbol", "answered"],
+        "Place": ["categorizedSymbol", "answer"],
         "Regions to search": ["graduatedSymbol", "rank"],
-        "Cells": ["graduatedSymbol", "chance_found"],
+        "Signature cells": ["graduatedSymbol", "chance_found"],
         "Street objects": ["categorizedSymbol", "class_code"],
         "Queries": ["categorizedSymbol", "outcome"],
         "From the true to the best place": ["categorizedSymbol", "outcome"],
@@ -343,45 +388,41 @@ def test_qgis_reads_the_translations(session: dict[str, Any], package: SimpleNam
 
 
 def test_layers_are_in_groups_with_points_above_areas(session: dict[str, Any]) -> None:
-    assert session["groups"]["Localize a query"] == ["Candidates", "Place", "Regions to search"]
-    assert session["groups"]["Export cells"] == ["Street objects", "Cells"]
+    title = commands()["localize"].title
+    assert sorted(session["groups"][title][:2]) == ["Candidates", "Place"]
+    assert session["groups"][title][2:] == ["Regions to search"]
+    assert session["groups"][commands()["export"].title] == ["Street objects", "Signature cells"]
 
 
 def test_other_tools_write_their_outputs(session: dict[str, Any]) -> None:
     others = session["others"]
     assert others["missing"] == []
-    assert others["nowhere"] == ["No place was given; type a name, or choose a layer of polygons."]
-    assert set(others["groups"]["Demo city"]) == {
-        *("Queries", "From the true to the best place", "Street objects", "Cells")
+    assert "cells" in others["info"]
+    assert "│" not in others["info"]
+    assert set(others["groups"][commands()["demo"].title]) == {
+        *("Queries", "From the true to the best place", "Street objects", "Signature cells")
     }
 
 
-def test_second_run_into_the_same_files_updates_the_layers(session: dict[str, Any]) -> None:
+def test_second_run_into_the_same_file_updates_the_layers(session: dict[str, Any]) -> None:
     first, second = session["first"], session["second"]
     for name in ("Candidates", "Regions to search"):
-        ((rows, extent, _),), ((new_rows, new_extent, _),) = first[name], second[name]
+        (rows, extent), (new_rows, new_extent) = first["layers"][name], second["layers"][name]
         assert new_rows < rows
         assert new_extent != extent
-    columns, new_columns = first["Regions to search"][0][2], second["Regions to search"][0][2]
-    assert "chance" in set(new_columns) - set(columns)
-    assert ("Place" in first, "Place" in second) == (False, True)
-    shared, tied, searched = first["infos"]
-    assert shared.startswith("The best ")
-    assert tied.endswith("further cells tie with the last candidate.")
-    assert searched.startswith("To search: ")
-    placed, searched = second["infos"][-2:]
-    assert "m of the ellipse's middle: chance " in placed
-    assert searched.startswith("To search: ")
+    assert ("Place" in first["layers"], "Place" in second["layers"]) == (False, True)
+    assert "to search: " in first["log"]
+    assert "to search: " in second["log"]
 
 
 def test_invalid_parameters_are_refused(session: dict[str, Any]) -> None:
     expected = (
         ("--heading and --area work only with the likelihood method",),
-        ("Place was given with the method types:edit",),
-        ("Detector was given with the method edit+edit",),
+        ("Area was given as", "give one of them"),
         ("b.shp does not end in .gpkg",),
         ("map.json does not end in .html",),
         ("lamps.geojson is not a folder",),
+        ("Area was not given",),
         ("/bin/true is not the semsig command", "later.parquet"),
     )
     for (sentence,), words in zip(session["refused"], expected, strict=True):
@@ -396,7 +437,7 @@ def test_cells_are_identified_and_exported(session: dict[str, Any], qgis: Qgis) 
     assert cells["chance_found"].between(0, 1).all()
     assert (qgis.place / "cells.html").is_file()
     objects, out = qgis.place / "objects.parquet", qgis.place / "export.gpkg"
-    qgis.run("export", DATABASE=source, OBJECTS=objects, GEOMETRY="point", OUTPUT=out)
+    qgis.run("export", DATABASE=source, OBJECTS=objects, GEOMETRY="point", OUT=out)
     layers = dict(pyogrio.list_layers(out).tolist())
     assert layers["cells"] == layers["objects"] == "Point"
 

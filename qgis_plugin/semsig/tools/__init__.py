@@ -1,1 +1,0 @@
-"""The tools of the provider: each module defines one or more algorithms."""
