@@ -4,84 +4,36 @@
 <context>
     <name>Semsig</name>
     <message>
-        <source>1. Load street objects</source>
-        <translation>1. Straßenobjekte laden</translation>
+        <source>10 from EXIF; otherwise left to semsig localize</source>
+        <translation>10 bei EXIF; sonst entscheidet semsig localize</translation>
     </message>
     <message>
-        <source>2. Build signature database</source>
-        <translation>2. Signaturdatenbank aufbauen</translation>
+        <source>250, or more where queries are few</source>
+        <translation>250, oder mehr, wo es wenige Anfragen gibt</translation>
     </message>
     <message>
-        <source>3. Localize a query</source>
-        <translation>3. Anfrage verorten</translation>
+        <source>A unique cell can be identified at once, one of a thousand cannot. The raster holds, for each cell, the number of cells that look the same. `semsig identify` gives more detail, and takes longer.</source>
+        <translation>Eine einmalige Zelle erkennt man sofort, eine von tausend nicht. Das Raster enthält für jede Zelle die Anzahl der Zellen, die gleich aussehen. `semsig identify` sagt mehr und dauert länger.</translation>
     </message>
     <message>
-        <source>4. Evaluate</source>
-        <translation>4. Auswerten</translation>
+        <source>Address of a Dask scheduler.</source>
+        <translation>Adresse eines Dask-Schedulers.</translation>
     </message>
     <message>
-        <source>5. Where queries can be placed</source>
-        <translation>5. Wo Anfragen verortet werden können</translation>
+        <source>Address of a server to use instead of the catalogue's.</source>
+        <translation>Adresse eines Servers, der statt des Servers des Katalogs verwendet wird.</translation>
     </message>
     <message>
-        <source>6. Export cells</source>
-        <translation>6. Zellen exportieren</translation>
+        <source>All layers</source>
+        <translation>Alle Layer</translation>
     </message>
     <message>
-        <source>A CRS in metres; by default that of the catalogue, or the UTM zone.</source>
-        <translation>Ein KBS in Metern; ohne Angabe das des Katalogs oder die UTM-Zone.</translation>
+        <source>Also remove the street objects, which updates and refined places need.</source>
+        <translation>Auch die Straßenobjekte entfernen, die Aktualisierungen und verfeinerte Orte brauchen.</translation>
     </message>
     <message>
-        <source>A GeoTIFF: for each cell, the number of cells that look the same.</source>
-        <translation>Ein GeoTIFF: für jede Zelle die Anzahl der Zellen, die gleich aussehen.</translation>
-    </message>
-    <message>
-        <source>A catalogue file, in addition to the catalogues chosen above or instead of them.</source>
-        <translation>Eine Katalogdatei, zusätzlich zu den oben gewählten oder statt ihrer.</translation>
-    </message>
-    <message>
-        <source>A catalogue says which file holds what: the open data of Montpellier and of Paris, and OpenStreetMap, are built in; for other data, write one (“Suggest a catalogue” drafts it).</source>
-        <translation>Ein Katalog sagt, welche Datei was enthält: die offenen Daten von Montpellier und Paris und OpenStreetMap sind eingebaut; für andere Daten schreiben Sie einen („Katalog vorschlagen“ entwirft ihn).</translation>
-    </message>
-    <message>
-        <source>A cell is drawn as</source>
-        <translation>Eine Zelle wird gezeichnet als</translation>
-    </message>
-    <message>
-        <source>A cell must see</source>
-        <translation>Eine Zelle muss sehen</translation>
-    </message>
-    <message>
-        <source>A folder in which the catalogue's files are looked for, instead of files.</source>
-        <translation>Ein Ordner, in dem die Dateien des Katalogs gesucht werden, statt einzelner Dateien.</translation>
-    </message>
-    <message>
-        <source>A large city takes minutes. Results that exist are not computed again.</source>
-        <translation>Eine große Stadt braucht Minuten. Vorhandene Ergebnisse werden nicht noch einmal berechnet.</translation>
-    </message>
-    <message>
-        <source>A page for the browser with the chances and the candidates.</source>
-        <translation>Eine Seite für den Browser mit den Chancen und den Kandidaten.</translation>
-    </message>
-    <message>
-        <source>A page for the browser, on which cells can be clicked.</source>
-        <translation>Eine Seite für den Browser, auf der Zellen angeklickt werden können.</translation>
-    </message>
-    <message>
-        <source>A page for the browser: successful and failed queries, and where they fail.</source>
-        <translation>Eine Seite für den Browser: erfolgreiche und gescheiterte Anfragen, und wo sie scheitern.</translation>
-    </message>
-    <message>
-        <source>A query counts as found if its best place is at most this far from the true place.</source>
-        <translation>Eine Anfrage gilt als gefunden, wenn ihr bester Ort höchstens so weit vom wahren entfernt ist.</translation>
-    </message>
-    <message>
-        <source>A query counts as right if one of this many candidates is right.</source>
-        <translation>Eine Anfrage gilt als richtig beantwortet, wenn einer von so vielen Kandidaten stimmt.</translation>
-    </message>
-    <message>
-        <source>A vector file of any format.</source>
-        <translation>Eine Vektordatei beliebigen Formats.</translation>
+        <source>Also the street objects</source>
+        <translation>Auch die Straßenobjekte</translation>
     </message>
     <message>
         <source>Ambiguity</source>
@@ -92,56 +44,68 @@
         <translation>Winkelstufen</translation>
     </message>
     <message>
-        <source>Another number draws other queries.</source>
-        <translation>Eine andere Zahl zieht andere Anfragen.</translation>
+        <source>Angle that the camera is rolled clockwise.</source>
+        <translation>Winkel, um den die Kamera im Uhrzeigersinn gedreht ist.</translation>
     </message>
     <message>
-        <source>Another number makes another city.</source>
-        <translation>Eine andere Zahl ergibt eine andere Stadt.</translation>
+        <source>Angle that the camera points upwards.</source>
+        <translation>Winkel, um den die Kamera nach oben zeigt.</translation>
     </message>
     <message>
-        <source>Another number simulates other queries.</source>
-        <translation>Eine andere Zahl simuliert andere Anfragen.</translation>
+        <source>Another signature database, built in the same way.</source>
+        <translation>Eine andere Signaturdatenbank, die ebenso aufgebaut wurde.</translation>
     </message>
     <message>
         <source>Answer</source>
         <translation>Antwort</translation>
     </message>
     <message>
-        <source>Applies new street objects to a database: only the cells that see a change are computed again. The layers of the new objects replace the same layers of the database.</source>
-        <translation>Bringt eine Datenbank auf den Stand neuer Straßenobjekte: nur die Zellen, die eine Änderung sehen, werden neu berechnet. Die Layer der neuen Objekte ersetzen die der Datenbank.</translation>
+        <source>Apply changed street objects to a database.</source>
+        <translation>Bringt eine Datenbank auf den Stand geänderter Straßenobjekte.</translation>
+    </message>
+    <message>
+        <source>Apply the catalogue's filters.</source>
+        <translation>Die Filter des Katalogs anwenden.</translation>
     </message>
     <message>
         <source>Area</source>
         <translation>Gebiet</translation>
     </message>
     <message>
-        <source>Around the regions (m)</source>
-        <translation>Um die Gebiete herum (m)</translation>
+        <source>Area to keep</source>
+        <translation>Gebiet, das bleibt</translation>
     </message>
     <message>
-        <source>Bearings (°)</source>
-        <translation>Richtungen (°)</translation>
+        <source>Box in degrees, a polygon file, or the name of a place.</source>
+        <translation>Rechteck in Grad, eine Datei mit Polygonen oder der Name eines Ortes.</translation>
     </message>
     <message>
-        <source>Best candidates that count</source>
-        <translation>Beste Kandidaten, die zählen</translation>
+        <source>Build a signature database from street objects.</source>
+        <translation>Baut eine Signaturdatenbank aus Straßenobjekten auf.</translation>
     </message>
     <message>
-        <source>Building footprints to write too, where the files have some. “Build signature database” hides what is behind them.</source>
-        <translation>Auch Gebäudegrundrisse schreiben, wo die Dateien welche haben. „Signaturdatenbank aufbauen“ verdeckt, was hinter ihnen liegt.</translation>
+        <source>Build signature database</source>
+        <translation>Signaturdatenbank aufbauen</translation>
     </message>
     <message>
-        <source>Building footprints to write too. “Build signature database” hides what is behind them.</source>
-        <translation>Auch Gebäudegrundrisse schreiben. „Signaturdatenbank aufbauen“ verdeckt, was hinter ihnen liegt.</translation>
+        <source>Building footprints that hide what is behind them.</source>
+        <translation>Gebäudegrundrisse, die verdecken, was hinter ihnen liegt.</translation>
     </message>
     <message>
-        <source>Building footprints; objects behind them are not seen.</source>
-        <translation>Grundrisse von Gebäuden; Objekte dahinter sind nicht zu sehen.</translation>
+        <source>Building footprints to write as well (.parquet).</source>
+        <translation>Gebäudegrundrisse, die auch geschrieben werden (.parquet).</translation>
     </message>
     <message>
         <source>Buildings</source>
         <translation>Gebäude</translation>
+    </message>
+    <message>
+        <source>CRS in metres to work in.</source>
+        <translation>KBS in Metern, in dem gearbeitet wird.</translation>
+    </message>
+    <message>
+        <source>CRS of files that do not state their own, such as EPSG:2154.</source>
+        <translation>KBS von Dateien, die ihres nicht angeben, etwa EPSG:2154.</translation>
     </message>
     <message>
         <source>CRS of the files</source>
@@ -150,6 +114,14 @@
     <message>
         <source>CRS to work in</source>
         <translation>KBS zum Arbeiten</translation>
+    </message>
+    <message>
+        <source>Camera data</source>
+        <translation>Kameradaten</translation>
+    </message>
+    <message>
+        <source>Camera data of single pictures: a CSV or JSON lines file with image and any of camera, fov, heading, heading_error, pitch, roll and place.</source>
+        <translation>Kameradaten einzelner Bilder: eine Datei mit CSV oder JSON-Zeilen mit image und beliebigen von camera, fov, heading, heading_error, pitch, roll und place.</translation>
     </message>
     <message>
         <source>Cancel</source>
@@ -172,12 +144,24 @@
         <translation>Katalog</translation>
     </message>
     <message>
-        <source>Catalogue of your own</source>
-        <translation>Eigener Katalog</translation>
+        <source>Catalogue with a service, by name or .toml.</source>
+        <translation>Katalog mit einem Dienst, nach Namen oder als .toml.</translation>
+    </message>
+    <message>
+        <source>Catalogue, by name or .toml file; default: list all.</source>
+        <translation>Katalog, nach Namen oder als .toml-Datei; ohne Angabe werden alle aufgeführt.</translation>
+    </message>
+    <message>
+        <source>Catalogue, by name or .toml file; not needed for OpenStreetMap and Overture. Repeat to merge several, best first.</source>
+        <translation>Katalog, nach Namen oder als .toml-Datei; für OpenStreetMap und Overture nicht nötig. Mehrere werden zusammengelegt, der beste zuerst.</translation>
     </message>
     <message>
         <source>Catalogues</source>
         <translation>Kataloge</translation>
+    </message>
+    <message>
+        <source>Catalogues of open data</source>
+        <translation>Kataloge offener Daten</translation>
     </message>
     <message>
         <source>Cell {cell} sees {types}; {count} other cells see the same types.</source>
@@ -188,28 +172,24 @@
         <translation>Zellen</translation>
     </message>
     <message>
-        <source>Cells that see nothing are left out. A folder with the street objects, ready to be searched, is written next to the database; keep it there.</source>
-        <translation>Zellen, die nichts sehen, fallen weg. Neben der Datenbank erscheint ein Ordner mit den Straßenobjekten; lassen Sie ihn dort.</translation>
+        <source>Centre lines of streets to write as well (.parquet).</source>
+        <translation>Mittellinien von Straßen, die auch geschrieben werden (.parquet).</translation>
     </message>
     <message>
-        <source>Centre lines of streets to write too, where the files have some.</source>
-        <translation>Auch Mittellinien von Straßen schreiben, wo die Dateien welche haben.</translation>
+        <source>Centre lines to draw below the map.</source>
+        <translation>Mittellinien, die unter die Karte gezeichnet werden.</translation>
     </message>
     <message>
-        <source>Centre lines of streets to write too.</source>
-        <translation>Auch Mittellinien von Straßen schreiben.</translation>
-    </message>
-    <message>
-        <source>Centre lines, for the viewpoints along streets.</source>
-        <translation>Mittellinien, für Standpunkte entlang der Straßen.</translation>
+        <source>Centre lines, for viewpoints near streets.</source>
+        <translation>Mittellinien, für Standpunkte an Straßen.</translation>
     </message>
     <message>
         <source>Chance</source>
         <translation>Wahrscheinlichkeit</translation>
     </message>
     <message>
-        <source>Chance that the regions contain</source>
-        <translation>Wahrscheinlichkeit in den Gebieten</translation>
+        <source>Changes</source>
+        <translation>Änderungen</translation>
     </message>
     <message>
         <source>Choose a rank in the list to go there.</source>
@@ -236,44 +216,108 @@
         <translation>Schließen</translation>
     </message>
     <message>
+        <source>Collapse objects of a class</source>
+        <translation>Objekte einer Klasse zusammenfassen</translation>
+    </message>
+    <message>
+        <source>Collapse objects of a class at the same place.</source>
+        <translation>Objekte einer Klasse am selben Ort zusammenfassen.</translation>
+    </message>
+    <message>
         <source>Composes the view that is seen from a place of the map.</source>
         <translation>Stellt zusammen, was man von einer Stelle der Karte aus sieht.</translation>
     </message>
     <message>
-        <source>Demo city</source>
-        <translation>Beispielstadt</translation>
+        <source>Corner of a cell in metres, in the CRS of the objects.</source>
+        <translation>Ecke einer Zelle in Metern, im KBS der Objekte.</translation>
     </message>
     <message>
-        <source>Detector</source>
-        <translation>Detektor</translation>
+        <source>Database to write.</source>
+        <translation>Datenbank, die geschrieben wird.</translation>
     </message>
     <message>
-        <source>Distance around their cells that is searched as well.</source>
-        <translation>Abstand um ihre Zellen, in dem auch gesucht wird.</translation>
+        <source>Databases</source>
+        <translation>Datenbanken</translation>
     </message>
     <message>
-        <source>Distortion</source>
-        <translation>Verfälschung</translation>
+        <source>Default street width, where --streets has none.</source>
+        <translation>Straßenbreite, wo --streets keine angibt.</translation>
     </message>
     <message>
-        <source>Divides the city into square cells and stores for each which street objects are seen from its centre, clockwise from north: its signature. Queries are compared with these signatures.</source>
-        <translation>Teilt die Stadt in quadratische Zellen und speichert für jede, welche Straßenobjekte von ihrer Mitte aus zu sehen sind, von Norden an im Uhrzeigersinn: ihre Signatur. Anfragen werden mit diesen Signaturen verglichen.</translation>
+        <source>Default: {}.</source>
+        <translation>Ohne Angabe: {}.</translation>
+    </message>
+    <message>
+        <source>Demonstration</source>
+        <translation>Vorführung</translation>
+    </message>
+    <message>
+        <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary or Panoramax JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: photographs, or folders of them.</source>
+        <translation>Detektionen: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary oder Panoramax JSON, CVAT oder Pascal VOC XML, YOLO .txt mit data.yaml, KITTI .txt, CSV von Roboflow; oder ein Ordner. Mit --detector: Fotos oder Ordner mit Fotos.</translation>
+    </message>
+    <message>
+        <source>Detectors</source>
+        <translation>Detektoren</translation>
+    </message>
+    <message>
+        <source>Direction of the camera, clockwise from north.</source>
+        <translation>Richtung der Kamera, von Norden an im Uhrzeigersinn.</translation>
     </message>
     <message>
         <source>Download OpenStreetMap for this canvas</source>
         <translation>OpenStreetMap für diesen Kartenausschnitt laden</translation>
     </message>
     <message>
-        <source>Downloads the street objects of OpenStreetMap (trees, lamps, benches, stops...) in a part of the map, from an Overpass server, into a table that “Build signature database” takes.</source>
-        <translation>Lädt die Straßenobjekte von OpenStreetMap (Bäume, Laternen, Bänke, Haltestellen …) in einem Teil der Karte von einem Overpass-Server herunter, in eine Tabelle für „Signaturdatenbank aufbauen“.</translation>
+        <source>Download street objects</source>
+        <translation>Straßenobjekte herunterladen</translation>
     </message>
     <message>
-        <source>Downloads the street objects of a city: by its name, or in the polygons of a layer. A catalogue says from where: OpenStreetMap has every place; a city's own portal has more of that city.</source>
-        <translation>Lädt die Straßenobjekte einer Stadt herunter: nach ihrem Namen oder in den Polygonen eines Layers. Ein Katalog sagt, woher: OpenStreetMap kennt jeden Ort; das Portal einer Stadt hat mehr von dieser Stadt.</translation>
+        <source>Download the street objects of OpenStreetMap in a part of the map, from an Overpass server.</source>
+        <translation>Lädt die Straßenobjekte von OpenStreetMap in einem Teil der Karte von einem Overpass-Server herunter.</translation>
     </message>
     <message>
-        <source>Drafts a catalogue for a file of your own: which column contains the kind of an object, and which class of street objects each of its values may be. Check and correct the draft in a text editor, and give it to “Load street objects” as a catalogue of your own.</source>
-        <translation>Entwirft einen Katalog für eine eigene Datei: welche Spalte die Art eines Objekts enthält, und welche Klasse von Straßenobjekten jeder ihrer Werte sein könnte. Prüfen und verbessern Sie den Entwurf in einem Texteditor, und geben Sie ihn „Straßenobjekte laden“ als eigenen Katalog.</translation>
+        <source>Download the street objects of an area.</source>
+        <translation>Lädt die Straßenobjekte eines Gebiets herunter.</translation>
+    </message>
+    <message>
+        <source>Draft a catalogue</source>
+        <translation>Katalog entwerfen</translation>
+    </message>
+    <message>
+        <source>Draft a catalogue for a vector file, for you to edit.</source>
+        <translation>Entwirft einen Katalog für eine Vektordatei, den Sie bearbeiten.</translation>
+    </message>
+    <message>
+        <source>Draw a map</source>
+        <translation>Karte zeichnen</translation>
+    </message>
+    <message>
+        <source>Draw an answer: the .tif file that `semsig localize --out` wrote.</source>
+        <translation>Eine Antwort zeichnen: die .tif-Datei, die `semsig localize --out` geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>Draw cells, evaluations, changes, answers or objects on a map.</source>
+        <translation>Zeichnet Zellen, Auswertungen, Änderungen, Antworten oder Objekte auf eine Karte.</translation>
+    </message>
+    <message>
+        <source>Draw how many cells look the same.</source>
+        <translation>Zeichnen, wie viele Zellen gleich aussehen.</translation>
+    </message>
+    <message>
+        <source>Draw how well cells can be found (after `semsig identify`).</source>
+        <translation>Zeichnen, wie gut Zellen gefunden werden können (nach `semsig identify`).</translation>
+    </message>
+    <message>
+        <source>Draw online tiles below the map, of a provider of xyzservices that needs no key, such as OpenStreetMap.Mapnik.</source>
+        <translation>Online-Kacheln unter die Karte zeichnen, von einem Anbieter aus xyzservices, der keinen Schlüssel verlangt, etwa OpenStreetMap.Mapnik.</translation>
+    </message>
+    <message>
+        <source>Draw street objects written by `semsig load`.</source>
+        <translation>Straßenobjekte zeichnen, die `semsig load` geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>Draw the changes up to this newer database.</source>
+        <translation>Die Änderungen bis zu dieser neueren Datenbank zeichnen.</translation>
     </message>
     <message>
         <source>Engine of Semantic signatures</source>
@@ -284,44 +328,80 @@
         <translation>Engine ...</translation>
     </message>
     <message>
-        <source>Every cell, outdoor cells, or outdoor cells near streets.</source>
-        <translation>Alle Zellen, Zellen außerhalb der Gebäude, oder Zellen an Straßen und außerhalb der Gebäude.</translation>
+        <source>Error of the heading</source>
+        <translation>Fehler der Blickrichtung</translation>
     </message>
     <message>
         <source>Explore a city</source>
         <translation>Stadt erkunden</translation>
     </message>
     <message>
-        <source>Extent</source>
-        <translation>Ausdehnung</translation>
+        <source>Export cells, objects and queries for QGIS and other programs.</source>
+        <translation>Exportiert Zellen, Objekte und Anfragen für QGIS und andere Programme.</translation>
     </message>
     <message>
-        <source>Fetch a city</source>
-        <translation>Stadt herunterladen</translation>
+        <source>Export to other programs</source>
+        <translation>Für andere Programme exportieren</translation>
+    </message>
+    <message>
+        <source>Field of view</source>
+        <translation>Blickfeld</translation>
     </message>
     <message>
         <source>File</source>
         <translation>Datei</translation>
     </message>
     <message>
+        <source>File to write</source>
+        <translation>Datei, die geschrieben wird</translation>
+    </message>
+    <message>
+        <source>File to write. Its suffix is the format: .gpkg (all layers, for QGIS), .parquet, .fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), .tif (one number per cell) or .json (STAC item).</source>
+        <translation>Datei, die geschrieben wird. Ihre Endung ist das Format: .gpkg (alle Layer, für QGIS), .parquet, .fgb, .geojson oder .csv (ein Layer), .pmtiles (Zellen für Webkarten), .tif (eine Zahl je Zelle) oder .json (STAC-Eintrag).</translation>
+    </message>
+    <message>
         <source>Files</source>
         <translation>Dateien</translation>
+    </message>
+    <message>
+        <source>Files, or a folder of files.</source>
+        <translation>Dateien oder ein Ordner mit Dateien.</translation>
+    </message>
+    <message>
+        <source>Filters of the catalogue</source>
+        <translation>Filter des Katalogs</translation>
     </message>
     <message>
         <source>Find the place</source>
         <translation>Ort suchen</translation>
     </message>
     <message>
-        <source>Finds where in the city a view was taken from: what is seen, clockwise from north, is compared with the signature of every cell. Types without bearings, or bearings without types, are enough.</source>
-        <translation>Findet, von wo in der Stadt eine Ansicht stammt: was zu sehen ist, von Norden an im Uhrzeigersinn, wird mit der Signatur jeder Zelle verglichen. Typen ohne Richtungen oder Richtungen ohne Typen genügen.</translation>
+        <source>First database</source>
+        <translation>Erste Datenbank</translation>
     </message>
     <message>
         <source>Folder</source>
         <translation>Ordner</translation>
     </message>
     <message>
-        <source>Folder for the results</source>
-        <translation>Ordner für die Ergebnisse</translation>
+        <source>Folder of results</source>
+        <translation>Ordner mit Ergebnissen</translation>
+    </message>
+    <message>
+        <source>Folder of the cache</source>
+        <translation>Ordner des Zwischenspeichers</translation>
+    </message>
+    <message>
+        <source>Folder of the cache.</source>
+        <translation>Ordner des Zwischenspeichers.</translation>
+    </message>
+    <message>
+        <source>Folder of the pictures</source>
+        <translation>Ordner der Bilder</translation>
+    </message>
+    <message>
+        <source>Folder of the pictures, to read focal length and heading from EXIF.</source>
+        <translation>Ordner der Bilder, um Brennweite und Blickrichtung aus EXIF zu lesen.</translation>
     </message>
     <message>
         <source>Folder of wheels</source>
@@ -336,12 +416,16 @@
         <translation>Der Ordner, in den geschrieben wird.</translation>
     </message>
     <message>
-        <source>For files that do not state theirs.</source>
-        <translation>Für Dateien, die ihres nicht angeben.</translation>
+        <source>Folder written by `semsig evaluate --out`, to add its queries.</source>
+        <translation>Ordner, den `semsig evaluate --out` geschrieben hat; seine Anfragen kommen hinzu.</translation>
     </message>
     <message>
-        <source>Found within (m)</source>
-        <translation>Gefunden im Umkreis von (m)</translation>
+        <source>Folder written by `semsig evaluate --out`.</source>
+        <translation>Ordner, den `semsig evaluate --out` geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>Footprints to draw below the map.</source>
+        <translation>Grundrisse, die unter die Karte gezeichnet werden.</translation>
     </message>
     <message>
         <source>Found: the place is within {metres} m with a chance of {chance}.</source>
@@ -352,36 +436,44 @@
         <translation>Vom wahren zum besten Ort</translation>
     </message>
     <message>
-        <source>Further distortions</source>
-        <translation>Weitere Verfälschungen</translation>
+        <source>GeoPackage</source>
+        <translation>GeoPackage</translation>
+    </message>
+    <message>
+        <source>GeoPackage written by `semsig export`.</source>
+        <translation>GeoPackage, das `semsig export` geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>Give up a download after this time, all attempts together.</source>
+        <translation>Einen Download nach dieser Zeit aufgeben, alle Versuche zusammen.</translation>
+    </message>
+    <message>
+        <source>Heading</source>
+        <translation>Blickrichtung</translation>
     </message>
     <message>
         <source>Help</source>
         <translation>Hilfe</translation>
     </message>
     <message>
-        <source>How cells are compared with a query. likelihood: by the chance that a detector sees the query from there. edit+edit: by the number of objects to add, remove or exchange to change one sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % of the cells with the best types. histogram+histogram: by how often each type and each angle occurs, in any order. jaccard+jaccard: by which types and which angles occur at all. types:edit and angles:edit: as edit+edit, by only the types or only the angles.</source>
-        <translation>Wie Zellen mit einer Anfrage verglichen werden. likelihood: nach der Chance, dass ein Detektor die Anfrage von dort sieht. edit+edit: danach, wie viele Objekte hinzukommen, wegfallen oder getauscht werden müssen, um die eine Folge in die andere zu verwandeln, im Mittel von Typen und Winkeln. edit+edit:5%: dasselbe unter den 5 % der Zellen, deren Typen am besten passen. histogram+histogram: danach, wie oft jeder Typ und jeder Winkel vorkommt, gleich in welcher Reihenfolge. jaccard+jaccard: danach, welche Typen und welche Winkel überhaupt vorkommen. types:edit und angles:edit: wie edit+edit, nach den Typen oder den Winkeln allein.</translation>
+        <source>Hexagons</source>
+        <translation>Sechsecke</translation>
     </message>
     <message>
-        <source>How many places (with likelihood) or cells to list at most.</source>
-        <translation>Wie viele Orte (bei likelihood) oder Zellen höchstens aufgeführt werden.</translation>
+        <source>Horizontal field of view.</source>
+        <translation>Horizontales Blickfeld.</translation>
     </message>
     <message>
-        <source>How many objects the detector gets wrong: none, 1, 7 or 13.</source>
-        <translation>Bei wie vielen Objekten der Detektor sich irrt: keinem, 1, 7 oder 13.</translation>
+        <source>How a cell is drawn.</source>
+        <translation>Wie eine Zelle gezeichnet wird: als Polygon (polygon) oder Punkt (point).</translation>
     </message>
     <message>
-        <source>How many queries are asked.</source>
-        <translation>Wie viele Anfragen gestellt werden.</translation>
+        <source>Identifiability</source>
+        <translation>Erkennbarkeit</translation>
     </message>
     <message>
-        <source>How much of what is seen will be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person notes down.</source>
-        <translation>Wie viel von dem Gesehenen falsch sein wird: light (wenig), medium (mittel), strong (viel) oder generic, wo das nicht bekannt ist; by-hand für das, was ein Mensch notiert.</translation>
-    </message>
-    <message>
-        <source>If “Where queries can be placed” was run, its results are written with the cells.</source>
-        <translation>Wurde „Wo Anfragen verortet werden können“ ausgeführt, stehen die Ergebnisse bei den Zellen.</translation>
+        <source>Import from QGIS</source>
+        <translation>Aus QGIS importieren</translation>
     </message>
     <message>
         <source>Install</source>
@@ -396,64 +488,152 @@
         <translation>Die Engine von Semantische Signaturen wird installiert</translation>
     </message>
     <message>
-        <source>Its square, or its centre.</source>
-        <translation>Ihr Quadrat oder ihre Mitte.</translation>
+        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the area that OpenStreetMap files state.</source>
+        <translation>Nur behalten, was in diesem Rechteck in Grad, in den Polygonen einer Datei oder mit 'box' in dem Gebiet liegt, das Dateien von OpenStreetMap angeben.</translation>
     </message>
     <message>
-        <source>Largest distance from which an object is seen, unless the catalogue gives one for its class.</source>
-        <translation>Größte Entfernung, aus der ein Objekt zu sehen ist, wenn der Katalog keine für seine Klasse nennt.</translation>
+        <source>Keep the cells in this box in degrees, or in polygons.</source>
+        <translation>Nur die Zellen in diesem Rechteck in Grad oder in Polygonen behalten.</translation>
+    </message>
+    <message>
+        <source>Largest distortion allowed for the CRS: degrees of bearings, percent of lengths.</source>
+        <translation>Größte zulässige Verzerrung des KBS: Grad bei Richtungen, Prozent bei Längen.</translation>
+    </message>
+    <message>
+        <source>Largest distortion of the CRS</source>
+        <translation>Größte Verzerrung des KBS</translation>
+    </message>
+    <message>
+        <source>Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; by default cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the default), identifiability, error, or field (share of the queries around that fail).</source>
+        <translation>Layer, der geschrieben wird: cells, objects, evaluation, evaluation_lines oder hexagons; ohne Angabe cells, in einem .gpkg alle (mehrere sind möglich). In einem .tif: ambiguity (ohne Angabe), identifiability, error oder field (Anteil der Anfragen im Umkreis, die scheitern).</translation>
+    </message>
+    <message>
+        <source>Layers</source>
+        <translation>Layer</translation>
+    </message>
+    <message>
+        <source>Leave out boxes with a lower score.</source>
+        <translation>Rahmen mit einem kleineren Konfidenzwert weglassen.</translation>
+    </message>
+    <message>
+        <source>List the catalogues, or the layers of one.</source>
+        <translation>Führt die Kataloge auf oder die Layer eines Katalogs.</translation>
+    </message>
+    <message>
+        <source>List what would be removed, but remove nothing.</source>
+        <translation>Aufführen, was entfernt würde, aber nichts entfernen.</translation>
+    </message>
+    <message>
+        <source>Load street objects</source>
+        <translation>Straßenobjekte laden</translation>
     </message>
     <message>
         <source>Looking for Python...</source>
         <translation>Python wird gesucht ...</translation>
     </message>
     <message>
-        <source>Makes up a small city, builds its database, evaluates queries and shows the results: to try the tools without data or a network. The folder contains city.parquet for the other tools.</source>
-        <translation>Erfindet eine kleine Stadt, baut ihre Datenbank, wertet Anfragen aus und zeigt die Ergebnisse: zum Ausprobieren, ohne Daten und Netz. Der Ordner enthält city.parquet für die anderen Werkzeuge.</translation>
+        <source>Lowest score</source>
+        <translation>Kleinster Konfidenzwert</translation>
+    </message>
+    <message>
+        <source>Make up a city</source>
+        <translation>Stadt erfinden</translation>
+    </message>
+    <message>
+        <source>Make up a city: street objects, buildings and streets.</source>
+        <translation>Erfindet eine Stadt: Straßenobjekte, Gebäude und Straßen.</translation>
+    </message>
+    <message>
+        <source>Map from labels to classes, by name or .toml file; repeat for several, best first. With --detector also the names of its classes: coco, or a .txt, .yaml or .json file (default: from the model).</source>
+        <translation>Zuordnung von Bezeichnungen zu Klassen, nach Namen oder als .toml-Datei; mehrere sind möglich, die beste zuerst. Mit --detector auch die Namen seiner Klassen: coco oder eine .txt-, .yaml- oder .json-Datei (ohne Angabe: aus dem Modell).</translation>
     </message>
     <message>
         <source>Map page</source>
         <translation>Kartenseite</translation>
     </message>
     <message>
-        <source>Measures how often answers are right. Cells are drawn as queries, their signatures are distorted as a bad detector would (objects missed, made up or misnamed, bearings off), and the best answer is compared with the true place.</source>
-        <translation>Misst, wie oft Antworten stimmen. Zellen werden als Anfragen gezogen, ihre Signaturen verfälscht, wie ein schlechter Detektor es täte (Objekte übersehen, erfunden oder falsch benannt, Richtungen ungenau), und die beste Antwort wird mit dem wahren Ort verglichen.</translation>
+        <source>Map to write (.html).</source>
+        <translation>Karte, die geschrieben wird (.html).</translation>
     </message>
     <message>
-        <source>Method</source>
-        <translation>Methode</translation>
+        <source>Maps of labels</source>
+        <translation>Zuordnungen der Bezeichnungen</translation>
     </message>
     <message>
-        <source>More distortions of a query, separated by commas, such as compass:10,view:90 (a compass that is off by 10°, a view of 90°).</source>
-        <translation>Weitere Störungen einer Anfrage, durch Kommas getrennt, etwa compass:10,view:90 (ein Kompass, der um 10° abweicht, ein Blickfeld von 90°).</translation>
+        <source>Merge objects of different layers within the catalogue's radii.</source>
+        <translation>Objekte verschiedener Layer innerhalb der Radien des Katalogs zusammenlegen.</translation>
     </message>
     <message>
-        <source>Name of a city or quarter, such as Gentilly, France.</source>
-        <translation>Name einer Stadt oder eines Viertels, etwa Gentilly, France.</translation>
+        <source>Merge objects of layers</source>
+        <translation>Objekte der Layer zusammenlegen</translation>
     </message>
     <message>
-        <source>North</source>
-        <translation>Norden</translation>
+        <source>Merge signature databases</source>
+        <translation>Signaturdatenbanken zusammenlegen</translation>
     </message>
     <message>
-        <source>North is off by (°)</source>
-        <translation>Norden weicht ab um (°)</translation>
+        <source>Merge the databases of two places into one.</source>
+        <translation>Legt die Datenbanken zweier Orte zu einer zusammen.</translation>
+    </message>
+    <message>
+        <source>Merged database</source>
+        <translation>Zusammengelegte Datenbank</translation>
+    </message>
+    <message>
+        <source>New street objects</source>
+        <translation>Neue Straßenobjekte</translation>
+    </message>
+    <message>
+        <source>New street objects; their layers replace layers of the database.</source>
+        <translation>Neue Straßenobjekte; ihre Layer ersetzen Layer der Datenbank.</translation>
     </message>
     <message>
         <source>North is unknown</source>
         <translation>Norden unbekannt</translation>
     </message>
     <message>
-        <source>Number of candidates</source>
-        <translation>Anzahl der Kandidaten</translation>
+        <source>Number of equal sectors in which the methods of the paper compare bearings.</source>
+        <translation>Anzahl gleicher Sektoren, in denen die Verfahren des Aufsatzes Richtungen vergleichen.</translation>
     </message>
     <message>
-        <source>Number of equal sectors in which the methods of the paper compare bearings. More sectors distinguish cells better, but tolerate smaller errors of bearings.</source>
-        <translation>Anzahl gleicher Sektoren, in denen die Verfahren des Aufsatzes Richtungen vergleichen. Mehr Sektoren unterscheiden Zellen besser, vertragen aber nur kleinere Fehler der Richtungen.</translation>
+        <source>Number of processes on this machine.</source>
+        <translation>Anzahl der Prozesse auf diesem Rechner.</translation>
     </message>
     <message>
         <source>Number of queries</source>
         <translation>Anzahl der Anfragen</translation>
+    </message>
+    <message>
+        <source>Number of queries to ask.</source>
+        <translation>Anzahl der Anfragen, die gestellt werden.</translation>
+    </message>
+    <message>
+        <source>Object detector</source>
+        <translation>Objektdetektor</translation>
+    </message>
+    <message>
+        <source>Object detector (.onnx) to run on photographs: YOLO, RT-DETR, DETR or torchvision. (needs the extra detect)</source>
+        <translation>Objektdetektor (.onnx), der auf Fotos angewandt wird: YOLO, RT-DETR, DETR oder torchvision. (braucht das Extra detect)</translation>
+    </message>
+    <message>
+        <source>Objects in both are kept once, and cells near both are computed again.</source>
+        <translation>Objekte in beiden bleiben nur einmal, und Zellen nahe bei beiden werden neu berechnet.</translation>
+    </message>
+    <message>
+        <source>Older versions and interrupted runs leave them; the database is not changed.</source>
+        <translation>Ältere Versionen und abgebrochene Läufe hinterlassen sie; die Datenbank wird nicht geändert.</translation>
+    </message>
+    <message>
+        <source>Online tiles</source>
+        <translation>Online-Kacheln</translation>
+    </message>
+    <message>
+        <source>Only list the files</source>
+        <translation>Dateien nur aufführen</translation>
+    </message>
+    <message>
+        <source>Only the classes of the paper</source>
+        <translation>Nur die Klassen des Aufsatzes</translation>
     </message>
     <message>
         <source>Open</source>
@@ -468,24 +648,48 @@
         <translation>Wird geöffnet; eine große Stadt dauert einige Sekunden ...</translation>
     </message>
     <message>
+        <source>Origin</source>
+        <translation>Ursprung</translation>
+    </message>
+    <message>
         <source>Overpass server (leave empty for the usual ones)</source>
         <translation>Overpass-Server (leer lassen für die üblichen)</translation>
+    </message>
+    <message>
+        <source>Pictures of one place</source>
+        <translation>Bilder eines Ortes</translation>
+    </message>
+    <message>
+        <source>Pictures to join into one view: none (each), pictures with GPS positions within 5 m (gps), or all; a place in --photos takes precedence.</source>
+        <translation>Bilder, die zu einer Ansicht verbunden werden: keine (each), Bilder mit GPS-Positionen im Umkreis von 5 m (gps) oder alle (all); ein Ort in --photos hat Vorrang.</translation>
+    </message>
+    <message>
+        <source>Pitch</source>
+        <translation>Neigung</translation>
     </message>
     <message>
         <source>Place</source>
         <translation>Ort</translation>
     </message>
     <message>
-        <source>Polygons instead of a name.</source>
-        <translation>Polygone statt eines Namens.</translation>
+        <source>Print the properties of a database next to those in the paper.</source>
+        <translation>Zeigt die Eigenschaften einer Datenbank neben denen im Aufsatz.</translation>
     </message>
     <message>
-        <source>Polygons that the cells must lie in.</source>
-        <translation>Polygone, in denen die Zellen liegen müssen.</translation>
+        <source>Processes</source>
+        <translation>Prozesse</translation>
     </message>
     <message>
-        <source>Predicts for every cell how likely a query from there will be found, and which other cells it may be confused with. A street with three lamps looks like thousands of others; this tool shows them.</source>
-        <translation>Sagt für jede Zelle voraus, wie wahrscheinlich eine Anfrage von dort gefunden wird und mit welchen anderen Zellen man sie verwechseln kann. Eine Straße mit drei Laternen sieht aus wie tausend andere; dieses Werkzeug zeigt sie.</translation>
+        <source>Projection</source>
+        <translation>Projektion</translation>
+    </message>
+    <message>
+        <source>Projection of the pictures.</source>
+        <translation>Projektion der Bilder.</translation>
+    </message>
+    <message>
+        <source>Properties of a database</source>
+        <translation>Eigenschaften einer Datenbank</translation>
     </message>
     <message>
         <source>Python (3.11 or newer)</source>
@@ -500,12 +704,32 @@
         <translation>Anfragen</translation>
     </message>
     <message>
+        <source>Radius of smoothing</source>
+        <translation>Radius der Glättung</translation>
+    </message>
+    <message>
+        <source>Radius over which an evaluation is smoothed.</source>
+        <translation>Radius, über den eine Auswertung geglättet wird.</translation>
+    </message>
+    <message>
         <source>Rank</source>
         <translation>Rang</translation>
     </message>
     <message>
-        <source>Reads files of open data (trees, street lights, benches, bus stops...) into one table of street objects, which “Build signature database” takes.</source>
-        <translation>Liest Dateien offener Daten (Bäume, Laternen, Bänke, Bushaltestellen …) in eine Tabelle von Straßenobjekten für „Signaturdatenbank aufbauen“.</translation>
+        <source>Read files of open data into street objects.</source>
+        <translation>Liest Dateien offener Daten in Straßenobjekte ein.</translation>
+    </message>
+    <message>
+        <source>Read only the eleven classes of the paper.</source>
+        <translation>Nur die elf Klassen des Aufsatzes lesen.</translation>
+    </message>
+    <message>
+        <source>Read only this layer, or with +NAME also this one; may be repeated.</source>
+        <translation>Nur diesen Layer lesen oder mit +NAME auch diesen; mehrere sind möglich.</translation>
+    </message>
+    <message>
+        <source>Read the optional layers of objects as well.</source>
+        <translation>Auch die optionalen Layer mit Objekten lesen.</translation>
     </message>
     <message>
         <source>Regions to search</source>
@@ -516,8 +740,52 @@
         <translation>Entfernen</translation>
     </message>
     <message>
+        <source>Remove leftover files</source>
+        <translation>Übrige Dateien entfernen</translation>
+    </message>
+    <message>
+        <source>Remove leftover files next to a database.</source>
+        <translation>Entfernt übrig gebliebene Dateien neben einer Datenbank.</translation>
+    </message>
+    <message>
+        <source>Resolution of hexagons</source>
+        <translation>Auflösung der Sechsecke</translation>
+    </message>
+    <message>
+        <source>Restore a database from an exported GeoPackage.</source>
+        <translation>Stellt eine Datenbank aus einem exportierten GeoPackage wieder her.</translation>
+    </message>
+    <message>
+        <source>Results</source>
+        <translation>Ergebnisse</translation>
+    </message>
+    <message>
+        <source>Roll</source>
+        <translation>Rollwinkel</translation>
+    </message>
+    <message>
+        <source>Run every step on a small made-up city, offline.</source>
+        <translation>Führt jeden Schritt mit einer kleinen erfundenen Stadt aus, ohne Netz.</translation>
+    </message>
+    <message>
+        <source>Scheduler</source>
+        <translation>Scheduler</translation>
+    </message>
+    <message>
+        <source>Second database</source>
+        <translation>Zweite Datenbank</translation>
+    </message>
+    <message>
         <source>Seed</source>
         <translation>Startwert</translation>
+    </message>
+    <message>
+        <source>Seed of the city and the queries.</source>
+        <translation>Startwert der Stadt und der Anfragen.</translation>
+    </message>
+    <message>
+        <source>Seed of the random numbers.</source>
+        <translation>Startwert der Zufallszahlen.</translation>
     </message>
     <message>
         <source>Seen from here</source>
@@ -532,28 +800,84 @@
         <translation>Semantische Signaturen</translation>
     </message>
     <message>
-        <source>Shows how many cells see the same types in the same order: a unique cell can be identified at once, one of a thousand cannot. “Where queries can be placed” gives more detail, and takes longer.</source>
-        <translation>Zeigt, wie viele Zellen dieselben Typen in derselben Reihenfolge sehen: eine einmalige Zelle erkennt man sofort, eine von tausend nicht. „Wo Anfragen verortet werden können“ sagt mehr und dauert länger.</translation>
+        <source>Server</source>
+        <translation>Server</translation>
+    </message>
+    <message>
+        <source>Shape of a cell</source>
+        <translation>Form einer Zelle</translation>
+    </message>
+    <message>
+        <source>Show how many cells see the same types in the same order.</source>
+        <translation>Zeigt, wie viele Zellen dieselben Typen in derselben Reihenfolge sehen.</translation>
     </message>
     <message>
         <source>Shows what is seen from a cell, and the most similar cells.</source>
         <translation>Zeigt, was man aus einer Zelle sieht, und die ähnlichsten Zellen.</translation>
     </message>
     <message>
-        <source>Side of a cell (m)</source>
-        <translation>Seite einer Zelle (m)</translation>
+        <source>Side of a cell</source>
+        <translation>Seite einer Zelle</translation>
+    </message>
+    <message>
+        <source>Side of a cell.</source>
+        <translation>Seite einer Zelle.</translation>
+    </message>
+    <message>
+        <source>Side of the city</source>
+        <translation>Seite der Stadt</translation>
+    </message>
+    <message>
+        <source>Side of the square city.</source>
+        <translation>Seite der quadratischen Stadt.</translation>
+    </message>
+    <message>
+        <source>Signature cells</source>
+        <translation>Signaturzellen</translation>
     </message>
     <message>
         <source>Signature database</source>
         <translation>Signaturdatenbank</translation>
     </message>
     <message>
+        <source>Signature database in one file or in tiles.</source>
+        <translation>Signaturdatenbank in einer Datei oder in Kacheln.</translation>
+    </message>
+    <message>
+        <source>Signature database to localize in; labels are mapped to its classes.</source>
+        <translation>Signaturdatenbank, in der verortet wird; Bezeichnungen werden ihren Klassen zugeordnet.</translation>
+    </message>
+    <message>
+        <source>Signature database to write (.parquet), or a folder with tiles.</source>
+        <translation>Signaturdatenbank, die geschrieben wird (.parquet), oder ein Ordner mit Kacheln.</translation>
+    </message>
+    <message>
+        <source>Signature database to write (.parquet).</source>
+        <translation>Signaturdatenbank, die geschrieben wird (.parquet).</translation>
+    </message>
+    <message>
+        <source>Signature database written by `semsig build`.</source>
+        <translation>Signaturdatenbank, die `semsig build` geschrieben hat.</translation>
+    </message>
+    <message>
         <source>Signature databases (*.parquet)</source>
         <translation>Signaturdatenbanken (*.parquet)</translation>
     </message>
     <message>
+        <source>Size of pictures where it is unknown, such as 1920x1080.</source>
+        <translation>Größe der Bilder, wo sie unbekannt ist, etwa 1920x1080.</translation>
+    </message>
+    <message>
+        <source>Size of the pictures</source>
+        <translation>Größe der Bilder</translation>
+    </message>
+    <message>
         <source>Some square kilometres take seconds to minutes. What was downloaded before is taken from the cache. The server is a setting: Settings &gt; Options &gt; Processing &gt; Providers &gt; Semantic signatures.</source>
         <translation>Einige Quadratkilometer brauchen Sekunden bis Minuten. Was schon heruntergeladen wurde, kommt aus dem Zwischenspeicher. Der Server wird eingestellt unter Einstellungen &gt; Optionen &gt; Verarbeitung &gt; Anbieter &gt; Semantische Signaturen.</translation>
+    </message>
+    <message>
+        <source>Standard deviation of the heading in degrees, or unknown.</source>
+        <translation>Standardabweichung der Blickrichtung in Grad, oder unknown (unbekannt).</translation>
     </message>
     <message>
         <source>Stopping...</source>
@@ -564,60 +888,32 @@
         <translation>Straßenobjekte</translation>
     </message>
     <message>
+        <source>Street objects to add as a layer.</source>
+        <translation>Straßenobjekte, die als Layer hinzukommen.</translation>
+    </message>
+    <message>
+        <source>Street objects to write (.parquet).</source>
+        <translation>Straßenobjekte, die geschrieben werden (.parquet).</translation>
+    </message>
+    <message>
+        <source>Street objects to write, if exported.</source>
+        <translation>Straßenobjekte, die geschrieben werden, wenn sie exportiert wurden.</translation>
+    </message>
+    <message>
+        <source>Street objects written by `semsig load`.</source>
+        <translation>Straßenobjekte, die `semsig load` geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>Street width</source>
+        <translation>Straßenbreite</translation>
+    </message>
+    <message>
         <source>Streets</source>
         <translation>Straßen</translation>
     </message>
     <message>
-        <source>Such as M (a bus stop), 2B (two trees or more), B=0 (no tree), ?&lt;=10 (ten objects or fewer).</source>
-        <translation>Etwa M (eine Bushaltestelle), 2B (zwei Bäume oder mehr), B=0 (kein Baum), ?&lt;=10 (höchstens zehn Objekte).</translation>
-    </message>
-    <message>
-        <source>Suggest a catalogue</source>
-        <translation>Katalog vorschlagen</translation>
-    </message>
-    <message>
-        <source>Symbols of what is seen, clockwise from north, such as DDBL; ? where one is unknown. The paper's: B tree, C fountain, D street light, E indicator, G traffic light, H bike station, I public toilet, J car sharing, K taxi rank, L bench, M bus stop; a catalogue may have more.</source>
-        <translation>Symbole dessen, was zu sehen ist, von Norden an im Uhrzeigersinn, etwa DDBL; ? für ein unbekanntes. Die des Aufsatzes: B Baum, C Brunnen, D Laterne, E Anzeiger, G Ampel, H Fahrradstation, I öffentliche Toilette, J Carsharing, K Taxistand, L Bank, M Bushaltestelle; ein Katalog kann mehr haben.</translation>
-    </message>
-    <message>
-        <source>The GeoPackage to write.</source>
-        <translation>Das GeoPackage, das geschrieben wird.</translation>
-    </message>
-    <message>
-        <source>The best places or cells.</source>
-        <translation>Die besten Orte oder Zellen.</translation>
-    </message>
-    <message>
-        <source>The catalogues of the files. With several, objects that two of them contain are merged; the first is treated as the best source.</source>
-        <translation>Die Kataloge der Dateien. Bei mehreren werden Objekte, die zwei davon haben, zusammengelegt; der erste gilt als beste Quelle.</translation>
-    </message>
-    <message>
-        <source>The cells and the street objects as layers, in a GeoPackage.</source>
-        <translation>Die Zellen und die Straßenobjekte als Layer, in einem GeoPackage.</translation>
-    </message>
-    <message>
-        <source>The cells by their chance, in a GeoPackage.</source>
-        <translation>Die Zellen nach ihrer Chance, in einem GeoPackage.</translation>
-    </message>
-    <message>
-        <source>The places that a view from here may be confused with, by chance:</source>
-        <translation>Die Orte, mit denen eine Ansicht von hier verwechselt werden kann, nach Wahrscheinlichkeit:</translation>
-    </message>
-    <message>
-        <source>The database to write.</source>
-        <translation>Die Datenbank, die geschrieben wird.</translation>
-    </message>
-    <message>
-        <source>The database to write. A temporary file is lost when QGIS is closed.</source>
-        <translation>Die Datenbank, die geschrieben wird. Eine temporäre Datei geht verloren, wenn QGIS beendet wird.</translation>
-    </message>
-    <message>
-        <source>The direction of each object, in degrees clockwise from north, separated by commas, such as 10,80,200,310.</source>
-        <translation>Die Richtung jedes Objekts, in Grad von Norden im Uhrzeigersinn, durch Kommas getrennt, etwa 10,80,200,310.</translation>
-    </message>
-    <message>
-        <source>The draft to write.</source>
-        <translation>Der Entwurf, der geschrieben wird.</translation>
+        <source>The city is divided into square cells. For each it is stored which street objects are seen from its centre, clockwise from north: its signature. Cells that see nothing are left out. A folder with the street objects, ready to be searched, is written next to the database.</source>
+        <translation>Die Stadt wird in quadratische Zellen geteilt. Für jede wird gespeichert, welche Straßenobjekte von ihrer Mitte aus zu sehen sind, von Norden an im Uhrzeigersinn: ihre Signatur. Zellen, die nichts sehen, fallen weg. Neben der Datenbank wird ein Ordner mit den Straßenobjekten geschrieben, bereit zum Suchen.</translation>
     </message>
     <message>
         <source>The engine did not answer.</source>
@@ -644,79 +940,59 @@
         <translation>Die Engine wurde entfernt.</translation>
     </message>
     <message>
-        <source>The extent to download; by default the extent of the canvas.</source>
-        <translation>Der Ausschnitt, der heruntergeladen wird; ohne Angabe der Ausschnitt der Karte.</translation>
-    </message>
-    <message>
-        <source>The file that “Build signature database” wrote.</source>
-        <translation>Die Datei, die „Signaturdatenbank aufbauen“ geschrieben hat.</translation>
-    </message>
-    <message>
-        <source>The file that “Load street objects” wrote, for a second layer.</source>
-        <translation>Die Datei, die „Straßenobjekte laden“ geschrieben hat, für einen zweiten Layer.</translation>
-    </message>
-    <message>
-        <source>The file that “Load street objects” wrote.</source>
-        <translation>Die Datei, die „Straßenobjekte laden“ geschrieben hat.</translation>
-    </message>
-    <message>
-        <source>The likelihood method gives each candidate a chance, estimates the place between the centres of cells with its uncertainty, and reports when it cannot decide. The other methods are from the paper; they rank cells by a distance, and cells that look the same share a rank.</source>
-        <translation>Das Verfahren likelihood gibt jedem Kandidaten eine Chance, schätzt den Ort zwischen den Mitten der Zellen mit seiner Unsicherheit und meldet, wenn es nicht entscheiden kann. Die anderen Verfahren sind aus dem Aufsatz; sie ordnen Zellen nach einer Distanz, und Zellen, die gleich aussehen, teilen einen Rang.</translation>
-    </message>
-    <message>
-        <source>The log has a table of the results; the folder contains them for other programs, and the layers and the map page show them.</source>
-        <translation>Im Protokoll steht eine Tabelle der Ergebnisse; der Ordner enthält sie für andere Programme, die Layer und die Kartenseite zeigen sie.</translation>
-    </message>
-    <message>
-        <source>The log reports how many rows became objects, how many were left out, and why.</source>
-        <translation>Das Protokoll meldet, wie viele Zeilen Objekte wurden, wie viele wegfielen, und warum.</translation>
-    </message>
-    <message>
-        <source>The new objects: the file that “Load street objects” or a download wrote.</source>
-        <translation>Die neuen Objekte: die Datei, die „Straßenobjekte laden“ oder ein Download geschrieben hat.</translation>
-    </message>
-    <message>
-        <source>The paper of Weng, Gouet-Brunet and Soheilian uses 10 m.</source>
-        <translation>Im Aufsatz von Weng, Gouet-Brunet und Soheilian sind es 10 m.</translation>
-    </message>
-    <message>
-        <source>The parts of the city to search for the query, in a GeoPackage.</source>
-        <translation>Die Teile der Stadt, die für die Anfrage abgesucht werden müssen, in einem GeoPackage.</translation>
-    </message>
-    <message>
-        <source>The queries at their true places, and lines to the places that were found, in a GeoPackage.</source>
-        <translation>Die Anfragen an ihren wahren Orten und Linien zu den gefundenen, in einem GeoPackage.</translation>
-    </message>
-    <message>
-        <source>The queries, their errors and a summary, for other programs.</source>
-        <translation>Die Anfragen, ihre Fehler und eine Zusammenfassung, für andere Programme.</translation>
-    </message>
-    <message>
-        <source>The results become columns of the database, and the cells are shown by their chance. The map page, which opens in a browser, shows on a click which cells a cell may be confused with.</source>
-        <translation>Die Ergebnisse werden Spalten der Datenbank, und die Zellen werden nach ihrer Chance gezeigt. Die Kartenseite für den Browser zeigt auf einen Klick, mit welchen Zellen eine Zelle verwechselt werden kann.</translation>
+        <source>The places that a view from here may be confused with, by chance:</source>
+        <translation>Die Orte, mit denen eine Ansicht von hier verwechselt werden kann, nach Wahrscheinlichkeit:</translation>
     </message>
     <message>
         <source>The semsig command (leave empty to look for it)</source>
         <translation>Der Befehl semsig (leer lassen, um ihn zu suchen)</translation>
     </message>
     <message>
-        <source>The table of street objects to write. A temporary file is lost when QGIS is closed.</source>
-        <translation>Die Tabelle der Straßenobjekte, die geschrieben wird. Eine temporäre Datei geht verloren, wenn QGIS beendet wird.</translation>
-    </message>
-    <message>
         <source>The tools need an engine: the program semsig in a Python environment of its own, in the folder of your QGIS profile. It takes about 1 GB; nothing else on this computer is changed.</source>
         <translation>Die Werkzeuge brauchen eine Engine: das Programm semsig in einer eigenen Python-Umgebung im Ordner Ihres QGIS-Profils. Sie belegt etwa 1 GB; sonst wird auf diesem Computer nichts geändert.</translation>
+    </message>
+    <message>
+        <source>The view fits the best place badly: worse than {worse} of 1,000 simulated views from there.</source>
+        <translation>Die Ansicht passt schlecht zum besten Ort: schlechter als {worse} von 1.000 simulierten Ansichten von dort.</translation>
+    </message>
+    <message>
+        <source>The view may not be from this area: chance {chance}.</source>
+        <translation>Die Ansicht stammt vielleicht nicht aus diesem Gebiet: Wahrscheinlichkeit {chance}.</translation>
+    </message>
+    <message>
+        <source>The view may not be from this area: chance {chance}; it fits the best place worse than {worse} of 1,000 simulated views from there.</source>
+        <translation>Die Ansicht stammt vielleicht nicht aus diesem Gebiet: Wahrscheinlichkeit {chance}; sie passt zum besten Ort schlechter als {worse} von 1.000 simulierten Ansichten von dort.</translation>
     </message>
     <message>
         <source>This is what is seen from there; change it, or find the place.</source>
         <translation>Das sieht man von dort; ändern Sie es oder suchen Sie den Ort.</translation>
     </message>
     <message>
-        <source>Types</source>
-        <translation>Arten</translation>
+        <source>Tile size</source>
+        <translation>Kachelgröße</translation>
     </message>
     <message>
-        <source>Update a signature database</source>
+        <source>Tile size; 2000 with --workers or --scheduler.</source>
+        <translation>Kachelgröße; 2000 mit --workers oder --scheduler.</translation>
+    </message>
+    <message>
+        <source>Time between the objects</source>
+        <translation>Zeit zwischen den Objekten</translation>
+    </message>
+    <message>
+        <source>Time limit</source>
+        <translation>Zeitlimit</translation>
+    </message>
+    <message>
+        <source>Title</source>
+        <translation>Titel</translation>
+    </message>
+    <message>
+        <source>Turn the boxes of an object detector into views for semsig localize.</source>
+        <translation>Macht aus den Rahmen eines Objektdetektors Ansichten für semsig localize.</translation>
+    </message>
+    <message>
+        <source>Update signature database</source>
         <translation>Signaturdatenbank aktualisieren</translation>
     </message>
     <message>
@@ -724,60 +1000,164 @@
         <translation>Aktualisierte Datenbank</translation>
     </message>
     <message>
-        <source>Vector files of any format, .osm or .osm.pbf; zipped is fine.</source>
-        <translation>Vektordateien beliebigen Formats, .osm oder .osm.pbf; auch gezippt.</translation>
+        <source>Use the cache only.</source>
+        <translation>Nur den Zwischenspeicher verwenden.</translation>
+    </message>
+    <message>
+        <source>Vector file to draft a catalogue for.</source>
+        <translation>Vektordatei, für die ein Katalog entworfen wird.</translation>
     </message>
     <message>
         <source>Viewpoints</source>
         <translation>Standpunkte</translation>
     </message>
     <message>
-        <source>Visibility range (m)</source>
-        <translation>Sichtweite (m)</translation>
+        <source>Viewpoints: every cell, outdoor cells or cells near streets (needs --streets).</source>
+        <translation>Standpunkte: alle Zellen (all), Zellen außerhalb der Gebäude (outdoor) oder Zellen an Straßen (streets, braucht --streets).</translation>
     </message>
     <message>
-        <source>Where the data come from.</source>
-        <translation>Woher die Daten kommen.</translation>
+        <source>Views</source>
+        <translation>Ansichten</translation>
     </message>
     <message>
-        <source>With likelihood and an uncertain north, the standard deviation.</source>
-        <translation>Bei likelihood und unsicherem Norden: die Standardabweichung.</translation>
+        <source>Views from detections</source>
+        <translation>Ansichten aus Detektionen</translation>
     </message>
     <message>
-        <source>With likelihood, how much of what is seen may be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person noted down.</source>
-        <translation>Bei likelihood: wie viel von dem Gesehenen falsch sein kann: light (wenig), medium (mittel), strong (viel) oder generic, wo das nicht bekannt ist; by-hand für das, was ein Mensch notiert hat.</translation>
+        <source>Views to write (.jsonl), for --queries.</source>
+        <translation>Ansichten, die geschrieben werden (.jsonl), für --queries.</translation>
     </message>
     <message>
-        <source>With likelihood, whether the north is known.</source>
-        <translation>Bei likelihood: ob Norden bekannt ist.</translation>
+        <source>Visibility range</source>
+        <translation>Sichtweite</translation>
     </message>
     <message>
-        <source>With likelihood: polygons that the place lies in.</source>
-        <translation>Bei likelihood: Polygone, in denen der Ort liegt.</translation>
+        <source>Visibility range for classes without a range in the catalogue.</source>
+        <translation>Sichtweite für Klassen, für die der Katalog keine nennt.</translation>
     </message>
     <message>
-        <source>With likelihood: the ellipse in which the place lies with a chance of 90 %, if the answer is right.</source>
-        <translation>Bei likelihood: die Ellipse, in der der Ort mit einer Chance von 90 % liegt, wenn die Antwort stimmt.</translation>
+        <source>Without a network</source>
+        <translation>Ohne Netz</translation>
     </message>
     <message>
-        <source>With likelihood: the regions are as large as needed to contain this chance, 0.9 by default.</source>
-        <translation>Bei likelihood: die Regionen sind so groß, dass sie diese Chance enthalten, ohne Angabe 0,9.</translation>
+        <source>Write a title on the map, such as the city and the date of its data.</source>
+        <translation>Einen Titel auf die Karte schreiben, etwa die Stadt und das Datum ihrer Daten.</translation>
     </message>
     <message>
-        <source>Writes the cells of a database to a GeoPackage: what is seen from each, clockwise from north, and how many other cells look the same; with the street objects, these become a second layer.</source>
-        <translation>Schreibt die Zellen einer Datenbank in ein GeoPackage: was von jeder aus zu sehen ist, von Norden an im Uhrzeigersinn, und wie viele andere Zellen gleich aussehen; werden die Straßenobjekte angegeben, so werden sie ein zweiter Layer.</translation>
+        <source>Write hexagons of this resolution of H3, such as 9, that sum up cells, objects and queries.</source>
+        <translation>Sechsecke dieser Auflösung von H3 schreiben, etwa 9, die Zellen, Objekte und Anfragen zusammenfassen.</translation>
+    </message>
+    <message>
+        <source>Years between the old objects and the new ones, for the report of --json.</source>
+        <translation>Jahre zwischen den alten und den neuen Objekten, für den Bericht von --json.</translation>
+    </message>
+    <message>
+        <source>all built-in maps</source>
+        <translation>alle eingebauten</translation>
+    </message>
+    <message>
+        <source>as a polygon, in CSV as a point</source>
+        <translation>als Polygon, in CSV als Punkt</translation>
+    </message>
+    <message>
+        <source>as many cells as Paris</source>
+        <translation>so viele Zellen wie Paris</translation>
     </message>
     <message>
         <source>downloaded</source>
         <translation>wird heruntergeladen</translation>
     </message>
     <message>
+        <source>extent</source>
+        <translation>Ausdehnung</translation>
+    </message>
+    <message>
+        <source>file</source>
+        <translation>Datei</translation>
+    </message>
+    <message>
+        <source>from EXIF</source>
+        <translation>aus EXIF</translation>
+    </message>
+    <message>
+        <source>from EXIF; 360 for a panorama</source>
+        <translation>aus EXIF; 360 bei einem Panorama</translation>
+    </message>
+    <message>
+        <source>from the database</source>
+        <translation>aus der Datenbank</translation>
+    </message>
+    <message>
+        <source>in place</source>
+        <translation>an Ort und Stelle</translation>
+    </message>
+    <message>
         <source>looked for</source>
         <translation>wird gesucht</translation>
     </message>
     <message>
+        <source>m</source>
+        <translation>m</translation>
+    </message>
+    <message>
+        <source>name</source>
+        <translation>Name</translation>
+    </message>
+    <message>
+        <source>over 99 %</source>
+        <translation>über 99 %</translation>
+    </message>
+    <message>
+        <source>pinhole</source>
+        <translation>pinhole (Lochkamera)</translation>
+    </message>
+    <message>
+        <source>polygons</source>
+        <translation>Polygone</translation>
+    </message>
+    <message>
+        <source>s</source>
+        <translation>s</translation>
+    </message>
+    <message>
+        <source>semsig's own</source>
+        <translation>der von semsig</translation>
+    </message>
+    <message>
+        <source>the catalogue's or the UTM zone</source>
+        <translation>das des Katalogs oder die UTM-Zone</translation>
+    </message>
+    <message>
+        <source>the classes of all built-in catalogues</source>
+        <translation>die Klassen aller eingebauten Kataloge</translation>
+    </message>
+    <message>
+        <source>the folder of the files, or the one of images next to it</source>
+        <translation>der Ordner der Dateien oder der Ordner images daneben</translation>
+    </message>
+    <message>
+        <source>the name of the database's file</source>
+        <translation>der Name der Datei der Datenbank</translation>
+    </message>
+    <message>
+        <source>under 1 %</source>
+        <translation>unter 1 %</translation>
+    </message>
+    <message>
+        <source>years</source>
+        <translation>Jahre</translation>
+    </message>
+    <message>
         <source>{name}: {cells} cells. Click a cell, or compose what you see.</source>
         <translation>{name}: {cells} Zellen. Klicken Sie eine Zelle an oder stellen Sie zusammen, was Sie sehen.</translation>
+    </message>
+    <message>
+        <source>°</source>
+        <translation>°</translation>
+    </message>
+    <message>
+        <source>“{}”</source>
+        <translation>„{}“</translation>
     </message>
 </context>
 </TS>

@@ -4,84 +4,36 @@
 <context>
     <name>Semsig</name>
     <message>
-        <source>1. Load street objects</source>
-        <translation>1. Charger les objets de rue</translation>
+        <source>10 from EXIF; otherwise left to semsig localize</source>
+        <translation>10 avec EXIF ; sinon laissé à semsig localize</translation>
     </message>
     <message>
-        <source>2. Build signature database</source>
-        <translation>2. Construire la base de signatures</translation>
+        <source>250, or more where queries are few</source>
+        <translation>250, ou plus là où les requêtes sont rares</translation>
     </message>
     <message>
-        <source>3. Localize a query</source>
-        <translation>3. Localiser une requête</translation>
+        <source>A unique cell can be identified at once, one of a thousand cannot. The raster holds, for each cell, the number of cells that look the same. `semsig identify` gives more detail, and takes longer.</source>
+        <translation>Une cellule unique se reconnaît aussitôt, une parmi mille non. Le raster contient, pour chaque cellule, le nombre de cellules qui se ressemblent. `semsig identify` en dit plus, et prend plus de temps.</translation>
     </message>
     <message>
-        <source>4. Evaluate</source>
-        <translation>4. Évaluer</translation>
+        <source>Address of a Dask scheduler.</source>
+        <translation>Adresse d’un ordonnanceur Dask.</translation>
     </message>
     <message>
-        <source>5. Where queries can be placed</source>
-        <translation>5. Où les requêtes peuvent être situées</translation>
+        <source>Address of a server to use instead of the catalogue's.</source>
+        <translation>Adresse d’un serveur à utiliser au lieu de celui du catalogue.</translation>
     </message>
     <message>
-        <source>6. Export cells</source>
-        <translation>6. Exporter les cellules</translation>
+        <source>All layers</source>
+        <translation>Toutes les couches</translation>
     </message>
     <message>
-        <source>A CRS in metres; by default that of the catalogue, or the UTM zone.</source>
-        <translation>Un SCR en mètres ; par défaut celui du catalogue, ou la zone UTM.</translation>
+        <source>Also remove the street objects, which updates and refined places need.</source>
+        <translation>Supprimer aussi les objets de rue, dont les mises à jour et les lieux affinés ont besoin.</translation>
     </message>
     <message>
-        <source>A GeoTIFF: for each cell, the number of cells that look the same.</source>
-        <translation>Un GeoTIFF : pour chaque cellule, le nombre de cellules de même aspect.</translation>
-    </message>
-    <message>
-        <source>A catalogue file, in addition to the catalogues chosen above or instead of them.</source>
-        <translation>Un fichier de catalogue, en plus de ceux choisis ci-dessus ou à leur place.</translation>
-    </message>
-    <message>
-        <source>A catalogue says which file holds what: the open data of Montpellier and of Paris, and OpenStreetMap, are built in; for other data, write one (“Suggest a catalogue” drafts it).</source>
-        <translation>Un catalogue dit quel fichier contient quoi : les données ouvertes de Montpellier et de Paris, et OpenStreetMap, sont intégrés ; pour d’autres données, écrivez-en un (« Proposer un catalogue » l’esquisse).</translation>
-    </message>
-    <message>
-        <source>A cell is drawn as</source>
-        <translation>Une cellule est dessinée comme</translation>
-    </message>
-    <message>
-        <source>A cell must see</source>
-        <translation>Une cellule doit voir</translation>
-    </message>
-    <message>
-        <source>A folder in which the catalogue's files are looked for, instead of files.</source>
-        <translation>Un dossier où sont cherchés les fichiers du catalogue, au lieu de fichiers.</translation>
-    </message>
-    <message>
-        <source>A large city takes minutes. Results that exist are not computed again.</source>
-        <translation>Une grande ville prend des minutes. Les résultats existants ne sont pas recalculés.</translation>
-    </message>
-    <message>
-        <source>A page for the browser with the chances and the candidates.</source>
-        <translation>Une page pour le navigateur avec les probabilités et les candidats.</translation>
-    </message>
-    <message>
-        <source>A page for the browser, on which cells can be clicked.</source>
-        <translation>Une page pour le navigateur, où l’on peut cliquer sur les cellules.</translation>
-    </message>
-    <message>
-        <source>A page for the browser: successful and failed queries, and where they fail.</source>
-        <translation>Une page pour le navigateur : requêtes réussies et manquées, et où elles échouent.</translation>
-    </message>
-    <message>
-        <source>A query counts as found if its best place is at most this far from the true place.</source>
-        <translation>Une requête compte comme trouvée si son meilleur lieu est à cette distance au plus du vrai.</translation>
-    </message>
-    <message>
-        <source>A query counts as right if one of this many candidates is right.</source>
-        <translation>Une requête est juste si l’un de ces premiers candidats est juste.</translation>
-    </message>
-    <message>
-        <source>A vector file of any format.</source>
-        <translation>Un fichier vecteur de n’importe quel format.</translation>
+        <source>Also the street objects</source>
+        <translation>Aussi les objets de rue</translation>
     </message>
     <message>
         <source>Ambiguity</source>
@@ -92,56 +44,68 @@
         <translation>Niveaux d’angle</translation>
     </message>
     <message>
-        <source>Another number draws other queries.</source>
-        <translation>Un autre nombre tire d’autres requêtes.</translation>
+        <source>Angle that the camera is rolled clockwise.</source>
+        <translation>Angle dont la caméra est tournée dans le sens des aiguilles d’une montre.</translation>
     </message>
     <message>
-        <source>Another number makes another city.</source>
-        <translation>Un autre nombre donne une autre ville.</translation>
+        <source>Angle that the camera points upwards.</source>
+        <translation>Angle dont la caméra pointe vers le haut.</translation>
     </message>
     <message>
-        <source>Another number simulates other queries.</source>
-        <translation>Un autre nombre simule d’autres requêtes.</translation>
+        <source>Another signature database, built in the same way.</source>
+        <translation>Une autre base de signatures, construite de la même façon.</translation>
     </message>
     <message>
         <source>Answer</source>
         <translation>Réponse</translation>
     </message>
     <message>
-        <source>Applies new street objects to a database: only the cells that see a change are computed again. The layers of the new objects replace the same layers of the database.</source>
-        <translation>Applique de nouveaux objets de rue à une base : seules les cellules qui voient un changement sont recalculées. Les couches des nouveaux objets remplacent celles de la base.</translation>
+        <source>Apply changed street objects to a database.</source>
+        <translation>Applique des objets de rue modifiés à une base.</translation>
+    </message>
+    <message>
+        <source>Apply the catalogue's filters.</source>
+        <translation>Appliquer les filtres du catalogue.</translation>
     </message>
     <message>
         <source>Area</source>
         <translation>Zone</translation>
     </message>
     <message>
-        <source>Around the regions (m)</source>
-        <translation>Autour des régions (m)</translation>
+        <source>Area to keep</source>
+        <translation>Zone à garder</translation>
     </message>
     <message>
-        <source>Bearings (°)</source>
-        <translation>Azimuts (°)</translation>
+        <source>Box in degrees, a polygon file, or the name of a place.</source>
+        <translation>Emprise en degrés, fichier de polygones, ou nom d’un lieu.</translation>
     </message>
     <message>
-        <source>Best candidates that count</source>
-        <translation>Meilleurs candidats qui comptent</translation>
+        <source>Build a signature database from street objects.</source>
+        <translation>Construit une base de signatures à partir d’objets de rue.</translation>
     </message>
     <message>
-        <source>Building footprints to write too, where the files have some. “Build signature database” hides what is behind them.</source>
-        <translation>Les emprises de bâtiments à écrire aussi, si les fichiers en ont. « Construire la base de signatures » cache ce qui est derrière.</translation>
+        <source>Build signature database</source>
+        <translation>Construire la base de signatures</translation>
     </message>
     <message>
-        <source>Building footprints to write too. “Build signature database” hides what is behind them.</source>
-        <translation>Les emprises de bâtiments à écrire aussi. « Construire la base de signatures » cache ce qui est derrière.</translation>
+        <source>Building footprints that hide what is behind them.</source>
+        <translation>Emprises de bâtiments qui cachent ce qui est derrière elles.</translation>
     </message>
     <message>
-        <source>Building footprints; objects behind them are not seen.</source>
-        <translation>Emprises de bâtiments ; les objets derrière elles ne se voient pas.</translation>
+        <source>Building footprints to write as well (.parquet).</source>
+        <translation>Emprises de bâtiments à écrire aussi (.parquet).</translation>
     </message>
     <message>
         <source>Buildings</source>
         <translation>Bâtiments</translation>
+    </message>
+    <message>
+        <source>CRS in metres to work in.</source>
+        <translation>SCR en mètres dans lequel travailler.</translation>
+    </message>
+    <message>
+        <source>CRS of files that do not state their own, such as EPSG:2154.</source>
+        <translation>SCR des fichiers qui n’indiquent pas le leur, comme EPSG:2154.</translation>
     </message>
     <message>
         <source>CRS of the files</source>
@@ -150,6 +114,14 @@
     <message>
         <source>CRS to work in</source>
         <translation>SCR de travail</translation>
+    </message>
+    <message>
+        <source>Camera data</source>
+        <translation>Données de caméra</translation>
+    </message>
+    <message>
+        <source>Camera data of single pictures: a CSV or JSON lines file with image and any of camera, fov, heading, heading_error, pitch, roll and place.</source>
+        <translation>Données de caméra de certaines images : un fichier CSV ou JSON par lignes avec image et au choix camera, fov, heading, heading_error, pitch, roll et place.</translation>
     </message>
     <message>
         <source>Cancel</source>
@@ -172,12 +144,24 @@
         <translation>Catalogue</translation>
     </message>
     <message>
-        <source>Catalogue of your own</source>
-        <translation>Votre propre catalogue</translation>
+        <source>Catalogue with a service, by name or .toml.</source>
+        <translation>Catalogue avec un service, par son nom ou en .toml.</translation>
+    </message>
+    <message>
+        <source>Catalogue, by name or .toml file; default: list all.</source>
+        <translation>Catalogue, par son nom ou un fichier .toml ; par défaut, tous sont énumérés.</translation>
+    </message>
+    <message>
+        <source>Catalogue, by name or .toml file; not needed for OpenStreetMap and Overture. Repeat to merge several, best first.</source>
+        <translation>Catalogue, par son nom ou un fichier .toml ; inutile pour OpenStreetMap et Overture. Plusieurs sont fusionnés, le meilleur d’abord.</translation>
     </message>
     <message>
         <source>Catalogues</source>
         <translation>Catalogues</translation>
+    </message>
+    <message>
+        <source>Catalogues of open data</source>
+        <translation>Catalogues de données ouvertes</translation>
     </message>
     <message>
         <source>Cell {cell} sees {types}; {count} other cells see the same types.</source>
@@ -188,28 +172,24 @@
         <translation>Cellules</translation>
     </message>
     <message>
-        <source>Cells that see nothing are left out. A folder with the street objects, ready to be searched, is written next to the database; keep it there.</source>
-        <translation>Les cellules qui ne voient rien sont omises. À côté de la base apparaît un dossier avec les objets de rue ; laissez-le là.</translation>
+        <source>Centre lines of streets to write as well (.parquet).</source>
+        <translation>Axes de rues à écrire aussi (.parquet).</translation>
     </message>
     <message>
-        <source>Centre lines of streets to write too, where the files have some.</source>
-        <translation>Les lignes médianes des rues à écrire aussi, si les fichiers en ont.</translation>
+        <source>Centre lines to draw below the map.</source>
+        <translation>Axes à dessiner sous la carte.</translation>
     </message>
     <message>
-        <source>Centre lines of streets to write too.</source>
-        <translation>Les lignes médianes des rues à écrire aussi.</translation>
-    </message>
-    <message>
-        <source>Centre lines, for the viewpoints along streets.</source>
-        <translation>Lignes médianes, pour les points de vue le long des rues.</translation>
+        <source>Centre lines, for viewpoints near streets.</source>
+        <translation>Axes, pour les points de vue près des rues.</translation>
     </message>
     <message>
         <source>Chance</source>
         <translation>Probabilité</translation>
     </message>
     <message>
-        <source>Chance that the regions contain</source>
-        <translation>Probabilité contenue dans les régions</translation>
+        <source>Changes</source>
+        <translation>Changements</translation>
     </message>
     <message>
         <source>Choose a rank in the list to go there.</source>
@@ -236,44 +216,108 @@
         <translation>Fermer</translation>
     </message>
     <message>
+        <source>Collapse objects of a class</source>
+        <translation>Réunir les objets d’une classe</translation>
+    </message>
+    <message>
+        <source>Collapse objects of a class at the same place.</source>
+        <translation>Réunir les objets d’une classe au même lieu.</translation>
+    </message>
+    <message>
         <source>Composes the view that is seen from a place of the map.</source>
         <translation>Compose la vue que l’on a d’un lieu de la carte.</translation>
     </message>
     <message>
-        <source>Demo city</source>
-        <translation>Ville de démonstration</translation>
+        <source>Corner of a cell in metres, in the CRS of the objects.</source>
+        <translation>Coin d’une cellule en mètres, dans le SCR des objets.</translation>
     </message>
     <message>
-        <source>Detector</source>
-        <translation>Détecteur</translation>
+        <source>Database to write.</source>
+        <translation>Base à écrire.</translation>
     </message>
     <message>
-        <source>Distance around their cells that is searched as well.</source>
-        <translation>Distance autour de leurs cellules où l’on cherche aussi.</translation>
+        <source>Databases</source>
+        <translation>Bases</translation>
     </message>
     <message>
-        <source>Distortion</source>
-        <translation>Distorsion</translation>
+        <source>Default street width, where --streets has none.</source>
+        <translation>Largeur de rue par défaut, là où --streets n’en a pas.</translation>
     </message>
     <message>
-        <source>Divides the city into square cells and stores for each which street objects are seen from its centre, clockwise from north: its signature. Queries are compared with these signatures.</source>
-        <translation>Découpe la ville en cellules carrées et enregistre pour chacune quels objets de rue se voient de son centre, à partir du nord dans le sens des aiguilles d’une montre : sa signature. Les requêtes sont comparées à ces signatures.</translation>
+        <source>Default: {}.</source>
+        <translation>Par défaut : {}.</translation>
+    </message>
+    <message>
+        <source>Demonstration</source>
+        <translation>Démonstration</translation>
+    </message>
+    <message>
+        <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary or Panoramax JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: photographs, or folders of them.</source>
+        <translation>Détections : JSON de COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary ou Panoramax, XML de CVAT ou Pascal VOC, .txt de YOLO avec data.yaml, .txt de KITTI, CSV de Roboflow ; ou un dossier. Avec --detector : des photos, ou des dossiers de photos.</translation>
+    </message>
+    <message>
+        <source>Detectors</source>
+        <translation>Détecteurs</translation>
+    </message>
+    <message>
+        <source>Direction of the camera, clockwise from north.</source>
+        <translation>Direction de la caméra, à partir du nord dans le sens des aiguilles d’une montre.</translation>
     </message>
     <message>
         <source>Download OpenStreetMap for this canvas</source>
         <translation>Télécharger OpenStreetMap pour cette carte</translation>
     </message>
     <message>
-        <source>Downloads the street objects of OpenStreetMap (trees, lamps, benches, stops...) in a part of the map, from an Overpass server, into a table that “Build signature database” takes.</source>
-        <translation>Télécharge les objets de rue d’OpenStreetMap (arbres, lampadaires, bancs, arrêts…) d’une partie de la carte, depuis un serveur Overpass, dans une table pour « Construire la base de signatures ».</translation>
+        <source>Download street objects</source>
+        <translation>Télécharger les objets de rue</translation>
     </message>
     <message>
-        <source>Downloads the street objects of a city: by its name, or in the polygons of a layer. A catalogue says from where: OpenStreetMap has every place; a city's own portal has more of that city.</source>
-        <translation>Télécharge les objets de rue d’une ville : par son nom, ou dans les polygones d’une couche. Un catalogue dit d’où : OpenStreetMap a tous les lieux ; le portail d’une ville en sait plus sur elle.</translation>
+        <source>Download the street objects of OpenStreetMap in a part of the map, from an Overpass server.</source>
+        <translation>Télécharge les objets de rue d’OpenStreetMap dans une partie de la carte, d’un serveur Overpass.</translation>
     </message>
     <message>
-        <source>Drafts a catalogue for a file of your own: which column contains the kind of an object, and which class of street objects each of its values may be. Check and correct the draft in a text editor, and give it to “Load street objects” as a catalogue of your own.</source>
-        <translation>Esquisse un catalogue pour un fichier à vous : quelle colonne contient le genre d’un objet, et quelle classe d’objets de rue chacune de ses valeurs peut être. Relisez et corrigez l’esquisse dans un éditeur de texte, et donnez-la à « Charger les objets de rue » comme votre propre catalogue.</translation>
+        <source>Download the street objects of an area.</source>
+        <translation>Télécharge les objets de rue d’une zone.</translation>
+    </message>
+    <message>
+        <source>Draft a catalogue</source>
+        <translation>Ébaucher un catalogue</translation>
+    </message>
+    <message>
+        <source>Draft a catalogue for a vector file, for you to edit.</source>
+        <translation>Ébauche un catalogue pour un fichier vectoriel, à modifier par vous.</translation>
+    </message>
+    <message>
+        <source>Draw a map</source>
+        <translation>Dessiner une carte</translation>
+    </message>
+    <message>
+        <source>Draw an answer: the .tif file that `semsig localize --out` wrote.</source>
+        <translation>Dessiner une réponse : le fichier .tif que `semsig localize --out` a écrit.</translation>
+    </message>
+    <message>
+        <source>Draw cells, evaluations, changes, answers or objects on a map.</source>
+        <translation>Dessine des cellules, des évaluations, des changements, des réponses ou des objets sur une carte.</translation>
+    </message>
+    <message>
+        <source>Draw how many cells look the same.</source>
+        <translation>Dessiner combien de cellules se ressemblent.</translation>
+    </message>
+    <message>
+        <source>Draw how well cells can be found (after `semsig identify`).</source>
+        <translation>Dessiner avec quelle facilité les cellules peuvent être trouvées (après `semsig identify`).</translation>
+    </message>
+    <message>
+        <source>Draw online tiles below the map, of a provider of xyzservices that needs no key, such as OpenStreetMap.Mapnik.</source>
+        <translation>Dessiner des tuiles en ligne sous la carte, d’un fournisseur de xyzservices qui ne demande pas de clé, comme OpenStreetMap.Mapnik.</translation>
+    </message>
+    <message>
+        <source>Draw street objects written by `semsig load`.</source>
+        <translation>Dessiner des objets de rue écrits par `semsig load`.</translation>
+    </message>
+    <message>
+        <source>Draw the changes up to this newer database.</source>
+        <translation>Dessiner les changements jusqu’à cette base plus récente.</translation>
     </message>
     <message>
         <source>Engine of Semantic signatures</source>
@@ -284,44 +328,80 @@
         <translation>Moteur…</translation>
     </message>
     <message>
-        <source>Every cell, outdoor cells, or outdoor cells near streets.</source>
-        <translation>Toutes les cellules, les cellules hors des bâtiments, ou les cellules près des rues et hors des bâtiments.</translation>
+        <source>Error of the heading</source>
+        <translation>Erreur du cap</translation>
     </message>
     <message>
         <source>Explore a city</source>
         <translation>Explorer une ville</translation>
     </message>
     <message>
-        <source>Extent</source>
-        <translation>Emprise</translation>
+        <source>Export cells, objects and queries for QGIS and other programs.</source>
+        <translation>Exporte des cellules, des objets et des requêtes pour QGIS et d’autres programmes.</translation>
     </message>
     <message>
-        <source>Fetch a city</source>
-        <translation>Télécharger une ville</translation>
+        <source>Export to other programs</source>
+        <translation>Exporter vers d’autres programmes</translation>
+    </message>
+    <message>
+        <source>Field of view</source>
+        <translation>Champ de vision</translation>
     </message>
     <message>
         <source>File</source>
         <translation>Fichier</translation>
     </message>
     <message>
+        <source>File to write</source>
+        <translation>Fichier à écrire</translation>
+    </message>
+    <message>
+        <source>File to write. Its suffix is the format: .gpkg (all layers, for QGIS), .parquet, .fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), .tif (one number per cell) or .json (STAC item).</source>
+        <translation>Fichier à écrire. Son suffixe est le format : .gpkg (toutes les couches, pour QGIS), .parquet, .fgb, .geojson ou .csv (une couche), .pmtiles (cellules pour cartes web), .tif (un nombre par cellule) ou .json (élément STAC).</translation>
+    </message>
+    <message>
         <source>Files</source>
         <translation>Fichiers</translation>
+    </message>
+    <message>
+        <source>Files, or a folder of files.</source>
+        <translation>Fichiers, ou un dossier de fichiers.</translation>
+    </message>
+    <message>
+        <source>Filters of the catalogue</source>
+        <translation>Filtres du catalogue</translation>
     </message>
     <message>
         <source>Find the place</source>
         <translation>Trouver le lieu</translation>
     </message>
     <message>
-        <source>Finds where in the city a view was taken from: what is seen, clockwise from north, is compared with the signature of every cell. Types without bearings, or bearings without types, are enough.</source>
-        <translation>Trouve d’où dans la ville une vue a été prise : ce qui se voit, à partir du nord dans le sens des aiguilles d’une montre, est comparé à la signature de chaque cellule. Des types sans azimuts ou des azimuts sans types suffisent.</translation>
+        <source>First database</source>
+        <translation>Première base</translation>
     </message>
     <message>
         <source>Folder</source>
         <translation>Dossier</translation>
     </message>
     <message>
-        <source>Folder for the results</source>
-        <translation>Dossier des résultats</translation>
+        <source>Folder of results</source>
+        <translation>Dossier de résultats</translation>
+    </message>
+    <message>
+        <source>Folder of the cache</source>
+        <translation>Dossier du cache</translation>
+    </message>
+    <message>
+        <source>Folder of the cache.</source>
+        <translation>Dossier du cache.</translation>
+    </message>
+    <message>
+        <source>Folder of the pictures</source>
+        <translation>Dossier des images</translation>
+    </message>
+    <message>
+        <source>Folder of the pictures, to read focal length and heading from EXIF.</source>
+        <translation>Dossier des images, pour lire la focale et le cap dans EXIF.</translation>
     </message>
     <message>
         <source>Folder of wheels</source>
@@ -333,15 +413,19 @@
     </message>
     <message>
         <source>Folder to write to.</source>
-        <translation>Le dossier où écrire.</translation>
+        <translation>Dossier dans lequel écrire.</translation>
     </message>
     <message>
-        <source>For files that do not state theirs.</source>
-        <translation>Pour les fichiers qui n’indiquent pas le leur.</translation>
+        <source>Folder written by `semsig evaluate --out`, to add its queries.</source>
+        <translation>Dossier écrit par `semsig evaluate --out`, dont les requêtes sont ajoutées.</translation>
     </message>
     <message>
-        <source>Found within (m)</source>
-        <translation>Trouvé à moins de (m)</translation>
+        <source>Folder written by `semsig evaluate --out`.</source>
+        <translation>Dossier écrit par `semsig evaluate --out`.</translation>
+    </message>
+    <message>
+        <source>Footprints to draw below the map.</source>
+        <translation>Emprises à dessiner sous la carte.</translation>
     </message>
     <message>
         <source>Found: the place is within {metres} m with a chance of {chance}.</source>
@@ -352,36 +436,44 @@
         <translation>Du vrai lieu au meilleur</translation>
     </message>
     <message>
-        <source>Further distortions</source>
-        <translation>Autres distorsions</translation>
+        <source>GeoPackage</source>
+        <translation>GeoPackage</translation>
+    </message>
+    <message>
+        <source>GeoPackage written by `semsig export`.</source>
+        <translation>GeoPackage écrit par `semsig export`.</translation>
+    </message>
+    <message>
+        <source>Give up a download after this time, all attempts together.</source>
+        <translation>Abandonner un téléchargement après ce temps, tous essais compris.</translation>
+    </message>
+    <message>
+        <source>Heading</source>
+        <translation>Cap</translation>
     </message>
     <message>
         <source>Help</source>
         <translation>Aide</translation>
     </message>
     <message>
-        <source>How cells are compared with a query. likelihood: by the chance that a detector sees the query from there. edit+edit: by the number of objects to add, remove or exchange to change one sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % of the cells with the best types. histogram+histogram: by how often each type and each angle occurs, in any order. jaccard+jaccard: by which types and which angles occur at all. types:edit and angles:edit: as edit+edit, by only the types or only the angles.</source>
-        <translation>Comment les cellules sont comparées à une requête. likelihood : par la probabilité qu’un détecteur voie la requête de là. edit+edit : par le nombre d’objets à ajouter, à ôter ou à échanger pour changer une suite en l’autre, en moyenne des types et des angles. edit+edit:5% : de même, parmi les 5 % des cellules dont les types correspondent le mieux. histogram+histogram : par le nombre de fois que chaque type et chaque angle apparaît, quel que soit l’ordre. jaccard+jaccard : par les types et les angles qui apparaissent. types:edit et angles:edit : comme edit+edit, par les types ou les angles seuls.</translation>
+        <source>Hexagons</source>
+        <translation>Hexagones</translation>
     </message>
     <message>
-        <source>How many places (with likelihood) or cells to list at most.</source>
-        <translation>Combien de lieux (avec likelihood) ou de cellules énumérer au plus.</translation>
+        <source>Horizontal field of view.</source>
+        <translation>Champ de vision horizontal.</translation>
     </message>
     <message>
-        <source>How many objects the detector gets wrong: none, 1, 7 or 13.</source>
-        <translation>Sur combien d’objets le détecteur se trompe : aucun, 1, 7 ou 13.</translation>
+        <source>How a cell is drawn.</source>
+        <translation>Comment une cellule est dessinée : polygone (polygon) ou point (point).</translation>
     </message>
     <message>
-        <source>How many queries are asked.</source>
-        <translation>Combien de requêtes sont posées.</translation>
+        <source>Identifiability</source>
+        <translation>Identifiabilité</translation>
     </message>
     <message>
-        <source>How much of what is seen will be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person notes down.</source>
-        <translation>Combien de ce qui est vu sera faux : light (peu), medium (moyen), strong (beaucoup), ou generic quand on ne le sait pas ; by-hand pour ce qu’une personne note.</translation>
-    </message>
-    <message>
-        <source>If “Where queries can be placed” was run, its results are written with the cells.</source>
-        <translation>Si « Où les requêtes peuvent être situées » a été exécuté, ses résultats accompagnent les cellules.</translation>
+        <source>Import from QGIS</source>
+        <translation>Importer de QGIS</translation>
     </message>
     <message>
         <source>Install</source>
@@ -396,64 +488,152 @@
         <translation>Installation du moteur de Signatures sémantiques</translation>
     </message>
     <message>
-        <source>Its square, or its centre.</source>
-        <translation>Son carré, ou son centre.</translation>
+        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the area that OpenStreetMap files state.</source>
+        <translation>Ne garder que ce qui est dans cette emprise en degrés, dans les polygones d’un fichier, ou avec 'box' dans la zone que les fichiers OpenStreetMap indiquent.</translation>
     </message>
     <message>
-        <source>Largest distance from which an object is seen, unless the catalogue gives one for its class.</source>
-        <translation>Plus grande distance d’où un objet se voit, si le catalogue n’en donne pas pour sa classe.</translation>
+        <source>Keep the cells in this box in degrees, or in polygons.</source>
+        <translation>Garder les cellules de cette emprise en degrés, ou des polygones.</translation>
+    </message>
+    <message>
+        <source>Largest distortion allowed for the CRS: degrees of bearings, percent of lengths.</source>
+        <translation>Plus grande déformation admise pour le SCR : degrés des azimuts, pour cent des longueurs.</translation>
+    </message>
+    <message>
+        <source>Largest distortion of the CRS</source>
+        <translation>Plus grande déformation du SCR</translation>
+    </message>
+    <message>
+        <source>Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; by default cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the default), identifiability, error, or field (share of the queries around that fail).</source>
+        <translation>Couche à écrire : cells, objects, evaluation, evaluation_lines ou hexagons ; par défaut cells, dans un .gpkg toutes (plusieurs sont possibles). Dans un .tif : ambiguity (par défaut), identifiability, error ou field (part des requêtes alentour qui échouent).</translation>
+    </message>
+    <message>
+        <source>Layers</source>
+        <translation>Couches</translation>
+    </message>
+    <message>
+        <source>Leave out boxes with a lower score.</source>
+        <translation>Omettre les cadres d’un score inférieur.</translation>
+    </message>
+    <message>
+        <source>List the catalogues, or the layers of one.</source>
+        <translation>Énumère les catalogues, ou les couches de l’un d’eux.</translation>
+    </message>
+    <message>
+        <source>List what would be removed, but remove nothing.</source>
+        <translation>Énumérer ce qui serait supprimé, mais ne rien supprimer.</translation>
+    </message>
+    <message>
+        <source>Load street objects</source>
+        <translation>Charger les objets de rue</translation>
     </message>
     <message>
         <source>Looking for Python...</source>
         <translation>Recherche de Python…</translation>
     </message>
     <message>
-        <source>Makes up a small city, builds its database, evaluates queries and shows the results: to try the tools without data or a network. The folder contains city.parquet for the other tools.</source>
-        <translation>Invente une petite ville, construit sa base, évalue des requêtes et montre les résultats : pour essayer, sans données ni réseau. Le dossier contient city.parquet pour les autres outils.</translation>
+        <source>Lowest score</source>
+        <translation>Score le plus bas</translation>
+    </message>
+    <message>
+        <source>Make up a city</source>
+        <translation>Inventer une ville</translation>
+    </message>
+    <message>
+        <source>Make up a city: street objects, buildings and streets.</source>
+        <translation>Invente une ville : objets de rue, bâtiments et rues.</translation>
+    </message>
+    <message>
+        <source>Map from labels to classes, by name or .toml file; repeat for several, best first. With --detector also the names of its classes: coco, or a .txt, .yaml or .json file (default: from the model).</source>
+        <translation>Correspondance entre étiquettes et classes, par son nom ou un fichier .toml ; plusieurs sont possibles, la meilleure d’abord. Avec --detector aussi les noms de ses classes : coco, ou un fichier .txt, .yaml ou .json (par défaut : du modèle).</translation>
     </message>
     <message>
         <source>Map page</source>
         <translation>Page de carte</translation>
     </message>
     <message>
-        <source>Measures how often answers are right. Cells are drawn as queries, their signatures are distorted as a bad detector would (objects missed, made up or misnamed, bearings off), and the best answer is compared with the true place.</source>
-        <translation>Mesure combien de fois les réponses sont justes. Des cellules sont tirées comme requêtes, leurs signatures déformées comme par un mauvais détecteur (objets manqués, inventés ou mal nommés, azimuts faux), et la meilleure réponse est comparée au vrai lieu.</translation>
+        <source>Map to write (.html).</source>
+        <translation>Carte à écrire (.html).</translation>
     </message>
     <message>
-        <source>Method</source>
-        <translation>Méthode</translation>
+        <source>Maps of labels</source>
+        <translation>Correspondances des étiquettes</translation>
     </message>
     <message>
-        <source>More distortions of a query, separated by commas, such as compass:10,view:90 (a compass that is off by 10°, a view of 90°).</source>
-        <translation>D’autres distorsions d’une requête, séparées par des virgules, comme compass:10,view:90 (une boussole fausse de 10°, un champ de vision de 90°).</translation>
+        <source>Merge objects of different layers within the catalogue's radii.</source>
+        <translation>Fusionner les objets de couches différentes dans les rayons du catalogue.</translation>
     </message>
     <message>
-        <source>Name of a city or quarter, such as Gentilly, France.</source>
-        <translation>Nom d’une ville ou d’un quartier, comme Gentilly, France.</translation>
+        <source>Merge objects of layers</source>
+        <translation>Fusionner les objets des couches</translation>
     </message>
     <message>
-        <source>North</source>
-        <translation>Nord</translation>
+        <source>Merge signature databases</source>
+        <translation>Fusionner des bases de signatures</translation>
     </message>
     <message>
-        <source>North is off by (°)</source>
-        <translation>Écart du nord (°)</translation>
+        <source>Merge the databases of two places into one.</source>
+        <translation>Fusionne les bases de deux lieux en une.</translation>
+    </message>
+    <message>
+        <source>Merged database</source>
+        <translation>Base fusionnée</translation>
+    </message>
+    <message>
+        <source>New street objects</source>
+        <translation>Nouveaux objets de rue</translation>
+    </message>
+    <message>
+        <source>New street objects; their layers replace layers of the database.</source>
+        <translation>Nouveaux objets de rue ; leurs couches remplacent des couches de la base.</translation>
     </message>
     <message>
         <source>North is unknown</source>
         <translation>Nord inconnu</translation>
     </message>
     <message>
-        <source>Number of candidates</source>
-        <translation>Nombre de candidats</translation>
+        <source>Number of equal sectors in which the methods of the paper compare bearings.</source>
+        <translation>Nombre de secteurs égaux dans lesquels les méthodes de l’article comparent les azimuts.</translation>
     </message>
     <message>
-        <source>Number of equal sectors in which the methods of the paper compare bearings. More sectors distinguish cells better, but tolerate smaller errors of bearings.</source>
-        <translation>Nombre de secteurs égaux dans lesquels les méthodes de l’article comparent les azimuts. Plus de secteurs distinguent mieux les cellules, mais tolèrent des erreurs d’azimut plus petites.</translation>
+        <source>Number of processes on this machine.</source>
+        <translation>Nombre de processus sur cette machine.</translation>
     </message>
     <message>
         <source>Number of queries</source>
         <translation>Nombre de requêtes</translation>
+    </message>
+    <message>
+        <source>Number of queries to ask.</source>
+        <translation>Nombre de requêtes à poser.</translation>
+    </message>
+    <message>
+        <source>Object detector</source>
+        <translation>Détecteur d’objets</translation>
+    </message>
+    <message>
+        <source>Object detector (.onnx) to run on photographs: YOLO, RT-DETR, DETR or torchvision. (needs the extra detect)</source>
+        <translation>Détecteur d’objets (.onnx) à appliquer à des photos : YOLO, RT-DETR, DETR ou torchvision. (demande l’extra detect)</translation>
+    </message>
+    <message>
+        <source>Objects in both are kept once, and cells near both are computed again.</source>
+        <translation>Les objets présents dans les deux sont gardés une fois, et les cellules proches des deux sont recalculées.</translation>
+    </message>
+    <message>
+        <source>Older versions and interrupted runs leave them; the database is not changed.</source>
+        <translation>Des versions antérieures et des exécutions interrompues les laissent ; la base n’est pas modifiée.</translation>
+    </message>
+    <message>
+        <source>Online tiles</source>
+        <translation>Tuiles en ligne</translation>
+    </message>
+    <message>
+        <source>Only list the files</source>
+        <translation>Seulement énumérer les fichiers</translation>
+    </message>
+    <message>
+        <source>Only the classes of the paper</source>
+        <translation>Seulement les classes de l’article</translation>
     </message>
     <message>
         <source>Open</source>
@@ -468,24 +648,48 @@
         <translation>Ouverture ; une grande ville prend quelques secondes…</translation>
     </message>
     <message>
+        <source>Origin</source>
+        <translation>Origine</translation>
+    </message>
+    <message>
         <source>Overpass server (leave empty for the usual ones)</source>
         <translation>Serveur Overpass (laisser vide pour les serveurs habituels)</translation>
+    </message>
+    <message>
+        <source>Pictures of one place</source>
+        <translation>Images d’un même lieu</translation>
+    </message>
+    <message>
+        <source>Pictures to join into one view: none (each), pictures with GPS positions within 5 m (gps), or all; a place in --photos takes precedence.</source>
+        <translation>Images à réunir en une vue : aucune (each), celles dont les positions GPS sont à moins de 5 m (gps), ou toutes (all) ; un lieu dans --photos l’emporte.</translation>
+    </message>
+    <message>
+        <source>Pitch</source>
+        <translation>Tangage</translation>
     </message>
     <message>
         <source>Place</source>
         <translation>Lieu</translation>
     </message>
     <message>
-        <source>Polygons instead of a name.</source>
-        <translation>Des polygones au lieu d’un nom.</translation>
+        <source>Print the properties of a database next to those in the paper.</source>
+        <translation>Montre les propriétés d’une base à côté de celles de l’article.</translation>
     </message>
     <message>
-        <source>Polygons that the cells must lie in.</source>
-        <translation>Polygones où doivent se trouver les cellules.</translation>
+        <source>Processes</source>
+        <translation>Processus</translation>
     </message>
     <message>
-        <source>Predicts for every cell how likely a query from there will be found, and which other cells it may be confused with. A street with three lamps looks like thousands of others; this tool shows them.</source>
-        <translation>Prédit pour chaque cellule avec quelle probabilité une requête faite là sera située, et avec quelles autres cellules elle peut être confondue. Une rue avec trois lampadaires ressemble à des milliers d’autres ; cet outil les montre.</translation>
+        <source>Projection</source>
+        <translation>Projection</translation>
+    </message>
+    <message>
+        <source>Projection of the pictures.</source>
+        <translation>Projection des images.</translation>
+    </message>
+    <message>
+        <source>Properties of a database</source>
+        <translation>Propriétés d’une base</translation>
     </message>
     <message>
         <source>Python (3.11 or newer)</source>
@@ -500,12 +704,32 @@
         <translation>Requêtes</translation>
     </message>
     <message>
+        <source>Radius of smoothing</source>
+        <translation>Rayon de lissage</translation>
+    </message>
+    <message>
+        <source>Radius over which an evaluation is smoothed.</source>
+        <translation>Rayon sur lequel une évaluation est lissée.</translation>
+    </message>
+    <message>
         <source>Rank</source>
         <translation>Rang</translation>
     </message>
     <message>
-        <source>Reads files of open data (trees, street lights, benches, bus stops...) into one table of street objects, which “Build signature database” takes.</source>
-        <translation>Lit des fichiers de données ouvertes (arbres, lampadaires, bancs, arrêts de bus…) dans une table d’objets de rue pour « Construire la base de signatures ».</translation>
+        <source>Read files of open data into street objects.</source>
+        <translation>Lit des fichiers de données ouvertes en objets de rue.</translation>
+    </message>
+    <message>
+        <source>Read only the eleven classes of the paper.</source>
+        <translation>Ne lire que les onze classes de l’article.</translation>
+    </message>
+    <message>
+        <source>Read only this layer, or with +NAME also this one; may be repeated.</source>
+        <translation>Ne lire que cette couche, ou avec +NAME lire aussi celle-ci ; plusieurs sont possibles.</translation>
+    </message>
+    <message>
+        <source>Read the optional layers of objects as well.</source>
+        <translation>Lire aussi les couches d’objets facultatives.</translation>
     </message>
     <message>
         <source>Regions to search</source>
@@ -516,8 +740,52 @@
         <translation>Supprimer</translation>
     </message>
     <message>
+        <source>Remove leftover files</source>
+        <translation>Supprimer les fichiers restants</translation>
+    </message>
+    <message>
+        <source>Remove leftover files next to a database.</source>
+        <translation>Supprime les fichiers restés à côté d’une base.</translation>
+    </message>
+    <message>
+        <source>Resolution of hexagons</source>
+        <translation>Résolution des hexagones</translation>
+    </message>
+    <message>
+        <source>Restore a database from an exported GeoPackage.</source>
+        <translation>Rétablit une base à partir d’un GeoPackage exporté.</translation>
+    </message>
+    <message>
+        <source>Results</source>
+        <translation>Résultats</translation>
+    </message>
+    <message>
+        <source>Roll</source>
+        <translation>Roulis</translation>
+    </message>
+    <message>
+        <source>Run every step on a small made-up city, offline.</source>
+        <translation>Exécute chaque étape sur une petite ville inventée, sans réseau.</translation>
+    </message>
+    <message>
+        <source>Scheduler</source>
+        <translation>Ordonnanceur</translation>
+    </message>
+    <message>
+        <source>Second database</source>
+        <translation>Deuxième base</translation>
+    </message>
+    <message>
         <source>Seed</source>
         <translation>Graine</translation>
+    </message>
+    <message>
+        <source>Seed of the city and the queries.</source>
+        <translation>Graine de la ville et des requêtes.</translation>
+    </message>
+    <message>
+        <source>Seed of the random numbers.</source>
+        <translation>Graine des nombres aléatoires.</translation>
     </message>
     <message>
         <source>Seen from here</source>
@@ -532,28 +800,84 @@
         <translation>Signatures sémantiques</translation>
     </message>
     <message>
-        <source>Shows how many cells see the same types in the same order: a unique cell can be identified at once, one of a thousand cannot. “Where queries can be placed” gives more detail, and takes longer.</source>
-        <translation>Montre combien de cellules voient les mêmes types dans le même ordre : une cellule unique se reconnaît aussitôt, une parmi mille non. « Où les requêtes peuvent être situées » en dit plus, et prend plus de temps.</translation>
+        <source>Server</source>
+        <translation>Serveur</translation>
+    </message>
+    <message>
+        <source>Shape of a cell</source>
+        <translation>Forme d’une cellule</translation>
+    </message>
+    <message>
+        <source>Show how many cells see the same types in the same order.</source>
+        <translation>Montre combien de cellules voient les mêmes types dans le même ordre.</translation>
     </message>
     <message>
         <source>Shows what is seen from a cell, and the most similar cells.</source>
         <translation>Montre ce que l’on voit d’une cellule, et les cellules qui lui ressemblent le plus.</translation>
     </message>
     <message>
-        <source>Side of a cell (m)</source>
-        <translation>Côté d’une cellule (m)</translation>
+        <source>Side of a cell</source>
+        <translation>Côté d’une cellule</translation>
+    </message>
+    <message>
+        <source>Side of a cell.</source>
+        <translation>Côté d’une cellule.</translation>
+    </message>
+    <message>
+        <source>Side of the city</source>
+        <translation>Côté de la ville</translation>
+    </message>
+    <message>
+        <source>Side of the square city.</source>
+        <translation>Côté de la ville carrée.</translation>
+    </message>
+    <message>
+        <source>Signature cells</source>
+        <translation>Cellules de signatures</translation>
     </message>
     <message>
         <source>Signature database</source>
         <translation>Base de signatures</translation>
     </message>
     <message>
+        <source>Signature database in one file or in tiles.</source>
+        <translation>Base de signatures en un fichier ou en tuiles.</translation>
+    </message>
+    <message>
+        <source>Signature database to localize in; labels are mapped to its classes.</source>
+        <translation>Base de signatures dans laquelle localiser ; les étiquettes sont rapportées à ses classes.</translation>
+    </message>
+    <message>
+        <source>Signature database to write (.parquet), or a folder with tiles.</source>
+        <translation>Base de signatures à écrire (.parquet), ou un dossier de tuiles.</translation>
+    </message>
+    <message>
+        <source>Signature database to write (.parquet).</source>
+        <translation>Base de signatures à écrire (.parquet).</translation>
+    </message>
+    <message>
+        <source>Signature database written by `semsig build`.</source>
+        <translation>Base de signatures écrite par `semsig build`.</translation>
+    </message>
+    <message>
         <source>Signature databases (*.parquet)</source>
         <translation>Bases de signatures (*.parquet)</translation>
     </message>
     <message>
+        <source>Size of pictures where it is unknown, such as 1920x1080.</source>
+        <translation>Taille des images là où elle est inconnue, comme 1920x1080.</translation>
+    </message>
+    <message>
+        <source>Size of the pictures</source>
+        <translation>Taille des images</translation>
+    </message>
+    <message>
         <source>Some square kilometres take seconds to minutes. What was downloaded before is taken from the cache. The server is a setting: Settings &gt; Options &gt; Processing &gt; Providers &gt; Semantic signatures.</source>
         <translation>Quelques kilomètres carrés prennent des secondes ou des minutes. Ce qui a déjà été téléchargé vient du cache. Le serveur se règle dans Préférences &gt; Options &gt; Traitement &gt; Fournisseurs &gt; Signatures sémantiques.</translation>
+    </message>
+    <message>
+        <source>Standard deviation of the heading in degrees, or unknown.</source>
+        <translation>Écart type du cap en degrés, ou unknown (inconnu).</translation>
     </message>
     <message>
         <source>Stopping...</source>
@@ -564,60 +888,32 @@
         <translation>Objets de rue</translation>
     </message>
     <message>
+        <source>Street objects to add as a layer.</source>
+        <translation>Objets de rue à ajouter comme couche.</translation>
+    </message>
+    <message>
+        <source>Street objects to write (.parquet).</source>
+        <translation>Objets de rue à écrire (.parquet).</translation>
+    </message>
+    <message>
+        <source>Street objects to write, if exported.</source>
+        <translation>Objets de rue à écrire, s’ils ont été exportés.</translation>
+    </message>
+    <message>
+        <source>Street objects written by `semsig load`.</source>
+        <translation>Objets de rue écrits par `semsig load`.</translation>
+    </message>
+    <message>
+        <source>Street width</source>
+        <translation>Largeur de rue</translation>
+    </message>
+    <message>
         <source>Streets</source>
         <translation>Rues</translation>
     </message>
     <message>
-        <source>Such as M (a bus stop), 2B (two trees or more), B=0 (no tree), ?&lt;=10 (ten objects or fewer).</source>
-        <translation>Comme M (un arrêt de bus), 2B (deux arbres ou plus), B=0 (aucun arbre), ?&lt;=10 (dix objets au plus).</translation>
-    </message>
-    <message>
-        <source>Suggest a catalogue</source>
-        <translation>Proposer un catalogue</translation>
-    </message>
-    <message>
-        <source>Symbols of what is seen, clockwise from north, such as DDBL; ? where one is unknown. The paper's: B tree, C fountain, D street light, E indicator, G traffic light, H bike station, I public toilet, J car sharing, K taxi rank, L bench, M bus stop; a catalogue may have more.</source>
-        <translation>Symboles de ce qui se voit, à partir du nord dans le sens des aiguilles d’une montre, comme DDBL ; ? pour un inconnu. Ceux de l’article : B arbre, C fontaine, D lampadaire, E indicateur, G feu de circulation, H station de vélos, I toilettes publiques, J autopartage, K station de taxis, L banc, M arrêt de bus ; un catalogue peut en avoir d’autres.</translation>
-    </message>
-    <message>
-        <source>The GeoPackage to write.</source>
-        <translation>Le GeoPackage à écrire.</translation>
-    </message>
-    <message>
-        <source>The best places or cells.</source>
-        <translation>Les meilleurs lieux ou cellules.</translation>
-    </message>
-    <message>
-        <source>The catalogues of the files. With several, objects that two of them contain are merged; the first is treated as the best source.</source>
-        <translation>Les catalogues des fichiers. S’il y en a plusieurs, les objets communs sont fusionnés ; le premier passe pour la meilleure source.</translation>
-    </message>
-    <message>
-        <source>The cells and the street objects as layers, in a GeoPackage.</source>
-        <translation>Les cellules et les objets de rue en couches, dans un GeoPackage.</translation>
-    </message>
-    <message>
-        <source>The cells by their chance, in a GeoPackage.</source>
-        <translation>Les cellules selon leur probabilité, dans un GeoPackage.</translation>
-    </message>
-    <message>
-        <source>The places that a view from here may be confused with, by chance:</source>
-        <translation>Les lieux avec lesquels une vue d’ici peut être confondue, par probabilité :</translation>
-    </message>
-    <message>
-        <source>The database to write.</source>
-        <translation>La base à écrire.</translation>
-    </message>
-    <message>
-        <source>The database to write. A temporary file is lost when QGIS is closed.</source>
-        <translation>La base à écrire. Un fichier temporaire est perdu à la fermeture de QGIS.</translation>
-    </message>
-    <message>
-        <source>The direction of each object, in degrees clockwise from north, separated by commas, such as 10,80,200,310.</source>
-        <translation>La direction de chaque objet, en degrés à partir du nord dans le sens des aiguilles d’une montre, séparées par des virgules, comme 10,80,200,310.</translation>
-    </message>
-    <message>
-        <source>The draft to write.</source>
-        <translation>L’esquisse à écrire.</translation>
+        <source>The city is divided into square cells. For each it is stored which street objects are seen from its centre, clockwise from north: its signature. Cells that see nothing are left out. A folder with the street objects, ready to be searched, is written next to the database.</source>
+        <translation>La ville est découpée en cellules carrées. Pour chacune est enregistré quels objets de rue se voient de son centre, à partir du nord dans le sens des aiguilles d’une montre : sa signature. Les cellules qui ne voient rien sont omises. À côté de la base est écrit un dossier avec les objets de rue, prêts pour la recherche.</translation>
     </message>
     <message>
         <source>The engine did not answer.</source>
@@ -644,140 +940,224 @@
         <translation>Le moteur a été supprimé.</translation>
     </message>
     <message>
-        <source>The extent to download; by default the extent of the canvas.</source>
-        <translation>L’emprise à télécharger ; par défaut l’emprise de la carte.</translation>
-    </message>
-    <message>
-        <source>The file that “Build signature database” wrote.</source>
-        <translation>Le fichier qu’a écrit « Construire la base de signatures ».</translation>
-    </message>
-    <message>
-        <source>The file that “Load street objects” wrote, for a second layer.</source>
-        <translation>Le fichier qu’a écrit « Charger les objets de rue », pour une seconde couche.</translation>
-    </message>
-    <message>
-        <source>The file that “Load street objects” wrote.</source>
-        <translation>Le fichier qu’a écrit « Charger les objets de rue ».</translation>
-    </message>
-    <message>
-        <source>The likelihood method gives each candidate a chance, estimates the place between the centres of cells with its uncertainty, and reports when it cannot decide. The other methods are from the paper; they rank cells by a distance, and cells that look the same share a rank.</source>
-        <translation>La méthode likelihood donne à chaque candidat une probabilité, estime le lieu entre les centres des cellules avec son incertitude, et signale quand elle ne peut pas décider. Les autres méthodes sont celles de l’article ; elles classent les cellules par une distance, et les cellules de même aspect partagent un rang.</translation>
-    </message>
-    <message>
-        <source>The log has a table of the results; the folder contains them for other programs, and the layers and the map page show them.</source>
-        <translation>Le journal contient un tableau des résultats ; le dossier les contient pour d’autres programmes, les couches et la page de carte les montrent.</translation>
-    </message>
-    <message>
-        <source>The log reports how many rows became objects, how many were left out, and why.</source>
-        <translation>Le journal indique combien de lignes sont devenues des objets, combien ont été omises, et pourquoi.</translation>
-    </message>
-    <message>
-        <source>The new objects: the file that “Load street objects” or a download wrote.</source>
-        <translation>Les nouveaux objets : le fichier qu’a écrit « Charger les objets de rue » ou un téléchargement.</translation>
-    </message>
-    <message>
-        <source>The paper of Weng, Gouet-Brunet and Soheilian uses 10 m.</source>
-        <translation>L’article de Weng, Gouet-Brunet et Soheilian prend 10 m.</translation>
-    </message>
-    <message>
-        <source>The parts of the city to search for the query, in a GeoPackage.</source>
-        <translation>Les parties de la ville où chercher pour la requête, dans un GeoPackage.</translation>
-    </message>
-    <message>
-        <source>The queries at their true places, and lines to the places that were found, in a GeoPackage.</source>
-        <translation>Les requêtes à leurs vrais lieux, et des lignes vers les lieux trouvés, dans un GeoPackage.</translation>
-    </message>
-    <message>
-        <source>The queries, their errors and a summary, for other programs.</source>
-        <translation>Les requêtes, leurs erreurs et un résumé, pour d’autres programmes.</translation>
-    </message>
-    <message>
-        <source>The results become columns of the database, and the cells are shown by their chance. The map page, which opens in a browser, shows on a click which cells a cell may be confused with.</source>
-        <translation>Les résultats deviennent des colonnes de la base, et les cellules sont montrées selon leur probabilité. La page de carte, qui s’ouvre dans un navigateur, montre d’un clic avec quelles cellules une cellule peut être confondue.</translation>
+        <source>The places that a view from here may be confused with, by chance:</source>
+        <translation>Les lieux avec lesquels une vue d’ici peut être confondue, par probabilité :</translation>
     </message>
     <message>
         <source>The semsig command (leave empty to look for it)</source>
         <translation>La commande semsig (laisser vide pour la chercher)</translation>
     </message>
     <message>
-        <source>The table of street objects to write. A temporary file is lost when QGIS is closed.</source>
-        <translation>La table d’objets de rue à écrire. Un fichier temporaire est perdu à la fermeture de QGIS.</translation>
-    </message>
-    <message>
         <source>The tools need an engine: the program semsig in a Python environment of its own, in the folder of your QGIS profile. It takes about 1 GB; nothing else on this computer is changed.</source>
         <translation>Les outils ont besoin d’un moteur : le programme semsig dans son propre environnement Python, dans le dossier de votre profil QGIS. Il occupe environ 1 Go ; rien d’autre n’est modifié sur cet ordinateur.</translation>
+    </message>
+    <message>
+        <source>The view fits the best place badly: worse than {worse} of 1,000 simulated views from there.</source>
+        <translation>La vue correspond mal au meilleur lieu : moins bien que {worse} vues simulées de là sur 1 000.</translation>
+    </message>
+    <message>
+        <source>The view may not be from this area: chance {chance}.</source>
+        <translation>La vue n’est peut-être pas de cette zone : probabilité {chance}.</translation>
+    </message>
+    <message>
+        <source>The view may not be from this area: chance {chance}; it fits the best place worse than {worse} of 1,000 simulated views from there.</source>
+        <translation>La vue n’est peut-être pas de cette zone : probabilité {chance} ; elle correspond au meilleur lieu moins bien que {worse} vues simulées de là sur 1 000.</translation>
     </message>
     <message>
         <source>This is what is seen from there; change it, or find the place.</source>
         <translation>Voici ce que l’on voit de là ; modifiez-le ou trouvez le lieu.</translation>
     </message>
     <message>
-        <source>Types</source>
-        <translation>Types</translation>
+        <source>Tile size</source>
+        <translation>Taille des tuiles</translation>
     </message>
     <message>
-        <source>Update a signature database</source>
-        <translation>Mettre à jour une base de signatures</translation>
+        <source>Tile size; 2000 with --workers or --scheduler.</source>
+        <translation>Taille des tuiles ; 2000 avec --workers ou --scheduler.</translation>
+    </message>
+    <message>
+        <source>Time between the objects</source>
+        <translation>Temps entre les objets</translation>
+    </message>
+    <message>
+        <source>Time limit</source>
+        <translation>Limite de temps</translation>
+    </message>
+    <message>
+        <source>Title</source>
+        <translation>Titre</translation>
+    </message>
+    <message>
+        <source>Turn the boxes of an object detector into views for semsig localize.</source>
+        <translation>Transforme les cadres d’un détecteur d’objets en vues pour semsig localize.</translation>
+    </message>
+    <message>
+        <source>Update signature database</source>
+        <translation>Mettre à jour la base de signatures</translation>
     </message>
     <message>
         <source>Updated database</source>
         <translation>Base mise à jour</translation>
     </message>
     <message>
-        <source>Vector files of any format, .osm or .osm.pbf; zipped is fine.</source>
-        <translation>Fichiers vecteur de n’importe quel format, .osm ou .osm.pbf ; zippés aussi.</translation>
+        <source>Use the cache only.</source>
+        <translation>N’utiliser que le cache.</translation>
+    </message>
+    <message>
+        <source>Vector file to draft a catalogue for.</source>
+        <translation>Fichier vectoriel pour lequel ébaucher un catalogue.</translation>
     </message>
     <message>
         <source>Viewpoints</source>
         <translation>Points de vue</translation>
     </message>
     <message>
-        <source>Visibility range (m)</source>
-        <translation>Portée de visibilité (m)</translation>
+        <source>Viewpoints: every cell, outdoor cells or cells near streets (needs --streets).</source>
+        <translation>Points de vue : chaque cellule (all), les cellules en extérieur (outdoor) ou les cellules près des rues (streets, avec --streets).</translation>
     </message>
     <message>
-        <source>Where the data come from.</source>
-        <translation>D’où viennent les données.</translation>
+        <source>Views</source>
+        <translation>Vues</translation>
     </message>
     <message>
-        <source>With likelihood and an uncertain north, the standard deviation.</source>
-        <translation>Avec likelihood et un nord incertain : l’écart type.</translation>
+        <source>Views from detections</source>
+        <translation>Vues à partir de détections</translation>
     </message>
     <message>
-        <source>With likelihood, how much of what is seen may be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person noted down.</source>
-        <translation>Avec likelihood : combien de ce qui est vu peut être faux : light (peu), medium (moyen), strong (beaucoup), ou generic quand on ne le sait pas ; by-hand pour ce qu’une personne a noté.</translation>
+        <source>Views to write (.jsonl), for --queries.</source>
+        <translation>Vues à écrire (.jsonl), pour --queries.</translation>
     </message>
     <message>
-        <source>With likelihood, whether the north is known.</source>
-        <translation>Avec likelihood : si le nord est connu.</translation>
+        <source>Visibility range</source>
+        <translation>Portée de visibilité</translation>
     </message>
     <message>
-        <source>With likelihood: polygons that the place lies in.</source>
-        <translation>Avec likelihood : polygones où se trouve le lieu.</translation>
+        <source>Visibility range for classes without a range in the catalogue.</source>
+        <translation>Portée de visibilité des classes pour lesquelles le catalogue n’en donne pas.</translation>
     </message>
     <message>
-        <source>With likelihood: the ellipse in which the place lies with a chance of 90 %, if the answer is right.</source>
-        <translation>Avec likelihood : l’ellipse où se trouve le lieu avec une probabilité de 90 %, si la réponse est juste.</translation>
+        <source>Without a network</source>
+        <translation>Sans réseau</translation>
     </message>
     <message>
-        <source>With likelihood: the regions are as large as needed to contain this chance, 0.9 by default.</source>
-        <translation>Avec likelihood : les régions sont aussi grandes qu’il le faut pour contenir cette probabilité, 0,9 par défaut.</translation>
+        <source>Write a title on the map, such as the city and the date of its data.</source>
+        <translation>Écrire un titre sur la carte, comme la ville et la date de ses données.</translation>
     </message>
     <message>
-        <source>Writes the cells of a database to a GeoPackage: what is seen from each, clockwise from north, and how many other cells look the same; with the street objects, these become a second layer.</source>
-        <translation>Écrit les cellules d’une base dans un GeoPackage : ce qui se voit de chacune, à partir du nord dans le sens des aiguilles d’une montre, et combien d’autres cellules ont le même aspect ; si les objets de rue sont donnés, ils deviennent une seconde couche.</translation>
+        <source>Write hexagons of this resolution of H3, such as 9, that sum up cells, objects and queries.</source>
+        <translation>Écrire des hexagones de cette résolution de H3, comme 9, qui résument cellules, objets et requêtes.</translation>
+    </message>
+    <message>
+        <source>Years between the old objects and the new ones, for the report of --json.</source>
+        <translation>Années entre les anciens objets et les nouveaux, pour le rapport de --json.</translation>
+    </message>
+    <message>
+        <source>all built-in maps</source>
+        <translation>toutes celles qui sont intégrées</translation>
+    </message>
+    <message>
+        <source>as a polygon, in CSV as a point</source>
+        <translation>un polygone, en CSV un point</translation>
+    </message>
+    <message>
+        <source>as many cells as Paris</source>
+        <translation>autant de cellules que Paris</translation>
     </message>
     <message>
         <source>downloaded</source>
         <translation>téléchargé</translation>
     </message>
     <message>
+        <source>extent</source>
+        <translation>emprise</translation>
+    </message>
+    <message>
+        <source>file</source>
+        <translation>fichier</translation>
+    </message>
+    <message>
+        <source>from EXIF</source>
+        <translation>d’EXIF</translation>
+    </message>
+    <message>
+        <source>from EXIF; 360 for a panorama</source>
+        <translation>d’EXIF ; 360 pour un panorama</translation>
+    </message>
+    <message>
+        <source>from the database</source>
+        <translation>de la base</translation>
+    </message>
+    <message>
+        <source>in place</source>
+        <translation>sur place</translation>
+    </message>
+    <message>
         <source>looked for</source>
         <translation>recherché</translation>
     </message>
     <message>
+        <source>m</source>
+        <translation>m</translation>
+    </message>
+    <message>
+        <source>name</source>
+        <translation>nom</translation>
+    </message>
+    <message>
+        <source>over 99 %</source>
+        <translation>plus de 99 %</translation>
+    </message>
+    <message>
+        <source>pinhole</source>
+        <translation>pinhole (sténopé)</translation>
+    </message>
+    <message>
+        <source>polygons</source>
+        <translation>polygones</translation>
+    </message>
+    <message>
+        <source>s</source>
+        <translation>s</translation>
+    </message>
+    <message>
+        <source>semsig's own</source>
+        <translation>celui de semsig</translation>
+    </message>
+    <message>
+        <source>the catalogue's or the UTM zone</source>
+        <translation>celui du catalogue, ou la zone UTM</translation>
+    </message>
+    <message>
+        <source>the classes of all built-in catalogues</source>
+        <translation>les classes de tous les catalogues intégrés</translation>
+    </message>
+    <message>
+        <source>the folder of the files, or the one of images next to it</source>
+        <translation>le dossier des fichiers, ou celui des images à côté</translation>
+    </message>
+    <message>
+        <source>the name of the database's file</source>
+        <translation>le nom du fichier de la base</translation>
+    </message>
+    <message>
+        <source>under 1 %</source>
+        <translation>moins de 1 %</translation>
+    </message>
+    <message>
+        <source>years</source>
+        <translation>ans</translation>
+    </message>
+    <message>
         <source>{name}: {cells} cells. Click a cell, or compose what you see.</source>
         <translation>{name} : {cells} cellules. Cliquez une cellule, ou composez ce que vous voyez.</translation>
+    </message>
+    <message>
+        <source>°</source>
+        <translation>°</translation>
+    </message>
+    <message>
+        <source>“{}”</source>
+        <translation>« {} »</translation>
     </message>
 </context>
 </TS>

@@ -180,50 +180,49 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         values |= {name: read_option(name, option, run) for name, option in self.options.items()}
         if self.tool.command == "fetch" and values["catalog"] == "openstreetmap":
             values["server"] = values.get("server") or settings.value(settings.OVERPASS)
-        written = {
-            parameter: path
-            for name, option in self.options.items()
-            for parameter, kind in parameter_kinds(name, option).items()
-            if kind in NEW and (path := values[name])
-        }
-        more = {
-            name: str(
-                self.parameterAsOutputLayer(parameters, name, context)
-                if extra.suffix == ".gpkg"
-                else self.parameterAsFileOutput(parameters, name, context)
-            )
-            for name, extra in self.tool.extras.items()
-        }
-        if self.tool.printed:
-            more[PRINTED] = str(self.parameterAsFileOutput(parameters, PRINTED, context))
-        suffixes = {name.upper(): option.get("x-writes") for name, option in self.options.items()}
-        suffixes |= {name: [extra.suffix] for name, extra in self.tool.extras.items()}
-        for name, path in {**written, **more}.items():
-            if path:
-                check_output(path, suffixes.get(name) or [self.tool.printed])
+        outputs = self._outputs(values, parameters, context)
         line = command_line(self.tool.command, self.command, values)
-        first = next((path for path in written.values() if Path(path).suffix), None)
+        own = [values[name] for name, option in self.options.items() if "x-writes" in option]
+        first = next((path for path in own if path and Path(path).suffix), None)
         printed = self._call(line, feedback, first)
-        feedback.pushConsoleInfo(log_text(printed))
         if self.tool.printed:
-            Path(more[PRINTED]).parent.mkdir(parents=True, exist_ok=True)
-            Path(more[PRINTED]).write_text(printed, encoding="utf-8")
+            Path(outputs[PRINTED]).parent.mkdir(parents=True, exist_ok=True)
+            Path(outputs[PRINTED]).write_text(printed, encoding="utf-8")
         for name, extra in self.tool.extras.items():
-            if more[name]:
-                self._write_extra(extra, values, more[name], feedback)
-        outputs = {**written, **more}
+            if name in outputs:
+                self._write_extra(extra, values, outputs[name], feedback)
         if self.tool.layers:
-            folder = next(iter(written.values()))
-            add_layers(context, str(Path(folder, self.tool.layers)), group=self._legend_group())
-        for name, path in outputs.items():
-            if path.endswith(".gpkg"):
-                outputs[name] = show_layers(context, path, group=self._legend_group())
+            layers = str(Path(next(iter(outputs.values())), self.tool.layers))
+            add_layers(context, layers, group=self._legend_group())
         # Not every source has buildings and streets, whose files are missing then.
         return {
-            name: path
+            name: show_layers(context, path, group=self._legend_group())
+            if path.endswith(".gpkg")
+            else path
             for name, path in outputs.items()
-            if path and Path(path.partition("|")[0]).exists()
+            if Path(path).exists()
         }
+
+    def _outputs(
+        self, values: dict[str, Any], parameters: dict[str, Any], context: QgsProcessingContext
+    ) -> dict[str, str]:
+        """Return the files to write by their parameters; raise CommandError if one cannot be."""
+        outputs, suffixes = {}, {}
+        for name, option in self.options.items():
+            for parameter, kind in parameter_kinds(name, option).items():
+                if kind in NEW:
+                    outputs[parameter], suffixes[parameter] = values[name], option["x-writes"]
+        for name, extra in self.tool.extras.items():
+            layers = extra.suffix == ".gpkg"
+            read = self.parameterAsOutputLayer if layers else self.parameterAsFileOutput
+            outputs[name], suffixes[name] = read(parameters, name, context), [extra.suffix]
+        if self.tool.printed:
+            outputs[PRINTED] = self.parameterAsFileOutput(parameters, PRINTED, context)
+            suffixes[PRINTED] = [self.tool.printed]
+        outputs = {name: str(path) for name, path in outputs.items() if path}
+        for name, path in outputs.items():
+            check_output(path, suffixes[name])
+        return outputs
 
     def _legend_group(self) -> str:
         """Return the title of the group for the layers."""
@@ -238,12 +237,12 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
             for name, value in extra.values.items()
         }
         line = command_line(extra.command, self.commands[extra.command], {**given, "out": path})
-        feedback.pushConsoleInfo(log_text(self._call(line, feedback, path)))
+        self._call(line, feedback, path)
 
     def _call(
         self, arguments: list[str], feedback: QgsProcessingFeedback, written: str | None
     ) -> str:
-        """Run a command, which may write a file, and return its standard output."""
+        """Run a command, which may write a file; log its standard output, and return it."""
         last_label = ""
 
         def progress(percent: int, label: str) -> None:
@@ -255,6 +254,8 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
 
         feedback.pushCommandInfo(shlex.join(["semsig", *arguments]))
         watcher = Watcher(progress, feedback.pushInfo, feedback.isCanceled)
-        return run_command(
+        printed = run_command(
             [settings.command(), *arguments], settings.environment(), watcher, written=written
         )
+        feedback.pushConsoleInfo(log_text(printed))
+        return printed

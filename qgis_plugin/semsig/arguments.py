@@ -32,18 +32,7 @@ def read_commands() -> dict[str, dict[str, Any]]:
 
 
 def value_schema(option: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of the value of an option that may be null.
-
-    Parameters
-    ----------
-    option : dict
-        A property of the request of a command.
-
-    Returns
-    -------
-    dict
-        The schema of one value; that of a list for a list.
-    """
+    """Return the schema of the value of an option that may be null: of a value, or of a list."""
     alternatives = option.get("anyOf", [option])
     return next(schema for schema in alternatives if schema["type"] != "null")
 
@@ -53,18 +42,8 @@ def parameter_kinds(  # noqa: PLR0911 - a kind each
 ) -> dict[str, str]:
     """Return the parameters for an option, their kinds by their names.
 
-    Parameters
-    ----------
-    name : str
-        Name of the option in the request.
-    option : dict
-        Its schema.
-
-    Returns
-    -------
-    dict
-        Usually one parameter: the name in upper case. An option that takes a box, a file or a
-        text, or a name or a file, has a parameter for each.
+    Usually it is one: the name of the option in upper case. An option that takes a box, a file or
+    a text, or a name or a file, has a parameter for each.
 
     Examples
     --------
@@ -94,7 +73,8 @@ def parameter_kinds(  # noqa: PLR0911 - a kind each
             f"{name}_EXTENT": "extent",
             **({f"{name}_TEXT": "text"} if others - {BOX, "CANVAS", "FILE"} else {}),
         }
-    if not option.get("x-reads"):
+    is_path = metavar in {"FILE", "FOLDER"}
+    if not option.get("x-reads") and not is_path:
         many_kind = "choices" if option.get("x-suggestions") else "lines"
         return {name: many_kind if many else "text"}
     if option.get("x-suggestions"):
@@ -105,19 +85,7 @@ def parameter_kinds(  # noqa: PLR0911 - a kind each
 
 
 def option_words(option: dict[str, Any], value: Any) -> list[str]:  # noqa: ANN401 - any value
-    """Return the words of a command line for the value of an option.
-
-    Parameters
-    ----------
-    option : dict
-        Its schema.
-    value : str, float, bool, list or None
-        The value. None, an empty text or list, and the default give no words.
-
-    Returns
-    -------
-    list of str
-        The words.
+    """Return the words of a command line for the value of an option; none for the default.
 
     Examples
     --------
@@ -134,27 +102,7 @@ def option_words(option: dict[str, Any], value: Any) -> list[str]:  # noqa: ANN4
 
 
 def command_line(name: str, command: dict[str, Any], values: dict[str, Any]) -> list[str]:
-    """Return the arguments of a command.
-
-    Parameters
-    ----------
-    name : str
-        Such as ``"build"``.
-    command : dict
-        Its schema.
-    values : dict
-        Values of its options.
-
-    Returns
-    -------
-    list of str
-        The arguments.
-
-    Raises
-    ------
-    CommandError
-        If an option that is required has no value.
-    """
+    """Return the arguments of a command; raise CommandError if a required option has no value."""
     request = command["request"]
     named: list[str] = []
     positional: list[str] = []
@@ -169,19 +117,9 @@ def command_line(name: str, command: dict[str, Any], values: dict[str, Any]) -> 
 
 
 def check_output(path: str, suffixes: list[str]) -> None:
-    """Raise an error before the work if an output cannot be written.
+    """Raise CommandError before the work if an output cannot be written.
 
-    Parameters
-    ----------
-    path : str
-        The file or folder to write. Missing folders are created by the command.
-    suffixes : list of str
-        The suffixes that the file may have; an empty one accepts any, also a folder.
-
-    Raises
-    ------
-    CommandError
-        If it cannot be written.
+    An empty suffix accepts any, also a folder. Missing folders are created by the command.
     """
     target = Path(path)
     if "" not in suffixes:

@@ -78,24 +78,7 @@ def titled(option: dict[str, Any]) -> str:
 def make_parameters(
     name: str, option: dict[str, Any], *, required: bool, text: str
 ) -> Iterator[QgsProcessingParameterDefinition]:
-    """Yield the parameters for an option.
-
-    Parameters
-    ----------
-    name : str
-        Name of the option.
-    option : dict
-        Its schema.
-    required : bool
-        Whether it must be given.
-    text : str
-        Its help.
-
-    Yields
-    ------
-    QgsProcessingParameterDefinition
-        A parameter.
-    """
+    """Yield the parameters for an option."""
     kinds = parameter_kinds(name, option)
     for parameter, kind in kinds.items():
         title = titled(option)
@@ -112,7 +95,7 @@ def make_parameters(
         yield definition
 
 
-def _definition(kind: str, name: str, title: str, option: dict[str, Any], *, required: bool) -> Any:  # noqa: ANN401 - any kind
+def _definition(kind: str, name: str, title: str, option: dict[str, Any], *, required: bool) -> Any:  # noqa: ANN401
     """Return the parameter of a kind."""
     default, schema = option.get("default"), value_schema(option)
     if kind in NEW:
@@ -166,21 +149,8 @@ def new_file(
 ) -> QgsProcessingParameterDefinition:
     """Return the parameter for a file or folder to write.
 
-    Parameters
-    ----------
-    kind : str
-        One of `NEW`.
-    name, title : str
-        Name and title.
-    suffixes : list of str
-        The suffixes that the file may have, the usual one first.
-    created : bool, default True
-        Whether it is written if the user chooses nothing; layers always are.
-
-    Returns
-    -------
-    QgsProcessingParameterDefinition
-        The parameter.
+    The usual suffix is the first. Without `created`, nothing is written by default, layers
+    excepted.
     """
     if kind == "layers":
         return QgsProcessingParameterVectorDestination(name, title)
@@ -208,26 +178,9 @@ def _canvas(option: dict[str, Any]) -> str | None:
 
 
 def read_option(name: str, option: dict[str, Any], run: Run) -> Any:  # noqa: ANN401 - any value
-    """Return the value of an option; None if it is not set.
+    """Return the value of an option, from all its parameters; None if it is not set.
 
-    Parameters
-    ----------
-    name : str
-        Name of the option.
-    option : dict
-        Its schema.
-    run : tuple
-        The algorithm, the values of its parameters, the context and the feedback.
-
-    Returns
-    -------
-    str, float, bool, list or None
-        The value, from all parameters of the option.
-
-    Raises
-    ------
-    CommandError
-        If two parameters of an option with one value are set.
+    Raises CommandError if two parameters of an option with one value are set.
     """
     kinds = parameter_kinds(name, option)
     values = [_read(kind, parameter, run) for parameter, kind in kinds.items()]

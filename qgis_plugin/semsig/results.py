@@ -123,19 +123,7 @@ _STYLERS: deque[_Styler] = deque(maxlen=1000)
 def show_layers(context: QgsProcessingContext, path: str, *, group: str) -> str:
     """Show the layers of a GeoPackage, if the user wants to see the file.
 
-    Parameters
-    ----------
-    context : QgsProcessingContext
-        Contains the file if it is to be shown.
-    path : str
-        The file.
-    group : str
-        Title of the group for the layers.
-
-    Returns
-    -------
-    str
-        The source of the first layer, in the notation of QGIS.
+    Return the source of the first layer, in the notation of QGIS.
     """
     layers = context.layersToLoadOnCompletion()
     details = layers.pop(path, None)
@@ -148,19 +136,7 @@ def show_layers(context: QgsProcessingContext, path: str, *, group: str) -> str:
 def add_layers(
     context: QgsProcessingContext, path: str, *, group: str, project: QgsProject | None = None
 ) -> None:
-    """Show the layers of a GeoPackage.
-
-    Parameters
-    ----------
-    context : QgsProcessingContext
-        The context of the run.
-    path : str
-        The file.
-    group : str
-        Title of the group for the layers.
-    project : QgsProject, optional
-        The project that shows them; the project of the context by default.
-    """
+    """Show the layers of a GeoPackage in a project, by default that of the context."""
     project = project or context.project()
     if project is None:  # there is no window
         return
@@ -173,13 +149,7 @@ def add_layers(
 
 
 def replace_answer(path: str) -> None:
-    """Show the layers of an answer of the dock, in place of those of the previous answer.
-
-    Parameters
-    ----------
-    path : str
-        Its GeoPackage.
-    """
+    """Show the layers of an answer of the dock, in place of those of the previous answer."""
     project = QgsProject.instance()
     project.removeMapLayers(
         [name for name, layer in project.mapLayers().items() if layer.customProperty(KEY)]

@@ -133,38 +133,14 @@ The server is a setting: Settings > Options > Processing > Providers > Semantic 
 
 
 def make_tools(commands: dict[str, dict[str, Any]]) -> dict[str, Tool]:
-    """Return the tools by their names, in the order of the commands.
-
-    Parameters
-    ----------
-    commands : dict
-        The schema of each command.
-
-    Returns
-    -------
-    dict
-        The tools.
-    """
+    """Return the tools by their names, in the order of the commands."""
     particular = {tool.name: tool for tool in _TOOLS if tool.command in commands}
     usual = {name: Tool(name, name) for name in commands if name not in LEFT_OUT}
     return {**usual, **particular}
 
 
 def tool_options(tool: Tool, command: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the schema of the options that a tool shows, by their names.
-
-    Parameters
-    ----------
-    tool : Tool
-        The tool.
-    command : dict
-        The schema of its command.
-
-    Returns
-    -------
-    dict
-        The schema of each.
-    """
+    """Return the schema of the options that a tool shows, by their names."""
     options = command["request"]["properties"]
     return {
         name: {**option, **tool.changed.get(name, {})}

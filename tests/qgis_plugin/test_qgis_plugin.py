@@ -103,7 +103,7 @@ def schema_texts(command: dict[str, Any]) -> set[str]:
     """Return the texts of a command and its options."""
     texts = {command["title"], command["group"], *paragraphs(command["description"])}
     for option in command["request"]["properties"].values():
-        texts |= {option["title"], option["description"]}
+        texts |= {option["title"], *paragraphs(option["description"])}
         texts |= {option.get("x-default", ""), option.get("x-unit", "")}
     return texts
 
