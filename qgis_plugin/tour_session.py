@@ -124,8 +124,8 @@ def fetch_and_build() -> str:
     parameters = dialog.createProcessingParameters()
     dialog.close()
     objects, city = str(WORK / "objects.parquet"), str(WORK / "city.parquet")
-    run("fetchcanvas", EXTENT=parameters["EXTENT"], OUTPUT=objects)
-    run("build", OBJECTS=objects, OUTPUT=city, CELLS=shown(str(WORK / "cells.gpkg")))
+    run("fetchcanvas", AREA_EXTENT=parameters["AREA_EXTENT"], OUT=objects)
+    run("build", OBJECTS=objects, OUT=city, CELLS=shown(str(WORK / "cells.gpkg")))
     picture("5_cells")
     return city
 
@@ -153,7 +153,7 @@ def ask(city: str) -> None:
         raise RuntimeError(dock.dial.marks)
     dock.dial.mark_clicked.emit(len(marks))  # removes it again
     dock.find.click()
-    wait(lambda: dock.table.rowCount() > 0)
+    wait(lambda: dock.answered > 0)
     picture("8_places")
     dock.table.selectRow(0)
     picture("9_rank_1")
@@ -171,15 +171,16 @@ def press(across: float, down: float) -> None:
 
 def localize(city: str) -> None:
     """Localize with the tool, which puts its layers into a group."""
-    run(
-        "localize",
-        DATABASE=city,
-        TYPES="DDBDL",
-        CANDIDATES=shown("TEMPORARY_OUTPUT"),
-        PLACE=shown("TEMPORARY_OUTPUT"),
-        REGIONS=shown(str(WORK / "regions.gpkg")),
-    )
+    from processing.gui.AlgorithmDialog import AlgorithmDialog
+
+    run("localize", DATABASE=city, TYPES="DDBDL", OUT=shown(str(WORK / "answer.gpkg")))
     picture("10_localize")
+    algorithm = QgsApplication.processingRegistry().createAlgorithmById("semsig:localize")
+    dialog = AlgorithmDialog(algorithm, parent=iface.mainWindow())
+    dialog.resize(1100, 860)
+    dialog.show()
+    picture("11_localize_dialog")
+    dialog.close()
     groups = [group.name() for group in QgsProject.instance().layerTreeRoot().findGroups()]
     (OUT / "groups.txt").write_text("\n".join(groups), "utf-8")
 
