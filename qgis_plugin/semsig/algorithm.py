@@ -108,14 +108,14 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         titles = {option["x-flag"]: tr(option["title"]) for option in request.values()}
         tools = make_tools(self.commands)
 
-        def command_title(found: re.Match[str]) -> str:
-            if found[1] not in tools:
-                return found[0]
-            title = SemsigAlgorithm(tools[found[1]], self.commands).displayName()
+        def command_title(match: re.Match[str]) -> str:
+            if match[1] not in tools:
+                return match[0]
+            title = SemsigAlgorithm(tools[match[1]], self.commands).displayName()
             return tr("“{}”").format(title)
 
-        def option_title(found: re.Match[str]) -> str:
-            return tr("“{}”").format(titles[found[0]]) if found[0] in titles else found[0]
+        def option_title(match: re.Match[str]) -> str:
+            return tr("“{}”").format(titles[match[0]]) if match[0] in titles else match[0]
 
         text = re.sub(r"`semsig ([\w-]+)[^`]*`", command_title, tr(" ".join(text.split())))
         return re.sub(r"--[a-z][a-z-]*", option_title, text)
@@ -194,7 +194,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         if self.tool.layers:
             layers = str(Path(next(iter(outputs.values())), self.tool.layers))
             add_layers(context, layers, group=self._legend_group())
-        # Not every source has buildings and streets, whose files are missing then.
+        # Not every source has buildings and streets; their files are missing then.
         return {
             name: show_layers(context, path, group=self._legend_group())
             if path.endswith(".gpkg")
@@ -232,11 +232,11 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         self, extra: Extra, values: dict[str, Any], path: str, feedback: QgsProcessingFeedback
     ) -> None:
         """Write one more file, with another command."""
-        given = {
+        options = {
             name: values[value[1:].lower()] if str(value).startswith("=") else value
             for name, value in extra.values.items()
         }
-        line = command_line(extra.command, self.commands[extra.command], {**given, "out": path})
+        line = command_line(extra.command, self.commands[extra.command], {**options, "out": path})
         self._call(line, feedback, path)
 
     def _call(

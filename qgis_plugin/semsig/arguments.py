@@ -104,16 +104,16 @@ def option_words(option: dict[str, Any], value: Any) -> list[str]:  # noqa: ANN4
 def command_line(name: str, command: dict[str, Any], values: dict[str, Any]) -> list[str]:
     """Return the arguments of a command; raise CommandError if a required option has no value."""
     request = command["request"]
-    named: list[str] = []
+    options: list[str] = []
     positional: list[str] = []
     for key, option in request["properties"].items():
         words = option_words(option, values.get(key))
         if not words and key in request["required"]:
             message = f"{option['title']} was not given; choose it, or type it."
             raise CommandError(message)
-        (positional if option.get("x-positional") else named).extend(words)
+        (positional if option.get("x-positional") else options).extend(words)
     # Words after the two dashes are never read as options, whatever they are.
-    return [name, *named, "--", *positional]
+    return [name, *options, "--", *positional]
 
 
 def check_output(path: str, suffixes: list[str]) -> None:

@@ -49,7 +49,7 @@ class Tool(NamedTuple):
     extras: Mapping[str, Extra] = EMPTY
     """More files to write, by the names of their parameters."""
     layers: str = ""
-    """Name of a GeoPackage in the folder that is written, whose layers are shown."""
+    """Name of a GeoPackage in the folder that is written; its layers are shown."""
     printed: str = ""
     """Suffix of a file for the text that the command prints."""
 
