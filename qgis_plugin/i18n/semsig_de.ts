@@ -4,6 +4,14 @@
 <context>
     <name>Semsig</name>
     <message>
+        <source>--explain, --share and the options from --noise to --objects work only with the likelihood method.</source>
+        <translation>--explain, --share und die Angaben von --noise bis --objects gelten nur für die Methode likelihood.</translation>
+    </message>
+    <message>
+        <source>0.9</source>
+        <translation>0,9</translation>
+    </message>
+    <message>
         <source>10 from EXIF; otherwise left to semsig localize</source>
         <translation>10 bei EXIF; sonst entscheidet semsig localize</translation>
     </message>
@@ -12,8 +20,24 @@
         <translation>250, oder mehr, wo es wenige Anfragen gibt</translation>
     </message>
     <message>
+        <source>A cell must see</source>
+        <translation>Eine Zelle muss sehen</translation>
+    </message>
+    <message>
         <source>A unique cell can be identified at once, one of a thousand cannot. The raster holds, for each cell, the number of cells that look the same. `semsig identify` gives more detail, and takes longer.</source>
         <translation>Eine einmalige Zelle erkennt man sofort, eine von tausend nicht. Das Raster enthält für jede Zelle die Anzahl der Zellen, die gleich aussehen. `semsig identify` sagt mehr und dauert länger.</translation>
+    </message>
+    <message>
+        <source>Accuracy</source>
+        <translation>Genauigkeit der Antworten</translation>
+    </message>
+    <message>
+        <source>Adapt the errors to the queries</source>
+        <translation>Fehler an die Anfragen anpassen</translation>
+    </message>
+    <message>
+        <source>Adapt the noise to all --queries first, which are views of one camera and detector.</source>
+        <translation>Das Fehlermodell zuerst an alle --queries anpassen, die Ansichten einer Kamera und eines Detektors sind.</translation>
     </message>
     <message>
         <source>Address of a Dask scheduler.</source>
@@ -24,12 +48,28 @@
         <translation>Adresse eines Servers, der statt des Servers des Katalogs verwendet wird.</translation>
     </message>
     <message>
+        <source>Adds columns to the database, which `semsig info`, `map` and `export` show.</source>
+        <translation>Fügt der Datenbank Spalten hinzu, die `semsig info`, `map` und `export` zeigen.</translation>
+    </message>
+    <message>
+        <source>Age of the map</source>
+        <translation>Alter der Karte</translation>
+    </message>
+    <message>
+        <source>Age of the map, from the survey of its objects to the query.</source>
+        <translation>Alter der Karte, von der Aufnahme ihrer Objekte bis zur Anfrage.</translation>
+    </message>
+    <message>
         <source>All layers</source>
         <translation>Alle Layer</translation>
     </message>
     <message>
         <source>Also remove the street objects, which updates and refined places need.</source>
         <translation>Auch die Straßenobjekte entfernen, die Aktualisierungen und verfeinerte Orte brauchen.</translation>
+    </message>
+    <message>
+        <source>Also search between the centres of cells.</source>
+        <translation>Auch zwischen den Mitten der Zellen suchen.</translation>
     </message>
     <message>
         <source>Also the street objects</source>
@@ -76,6 +116,30 @@
         <translation>Gebiet, das bleibt</translation>
     </message>
     <message>
+        <source>Assume that views are from the area of the database. Otherwise the chance that they are from elsewhere is 50 % before their objects are compared.</source>
+        <translation>Annehmen, dass Ansichten aus dem Gebiet der Datenbank stammen. Sonst ist die Wahrscheinlichkeit, dass sie von woanders stammen, 50 %, bevor ihre Objekte verglichen werden.</translation>
+    </message>
+    <message>
+        <source>Assume that views are from the centre of a cell, as in the paper, instead of from anywhere in it.</source>
+        <translation>Annehmen, dass Ansichten wie im Aufsatz aus der Mitte einer Zelle stammen, statt von irgendwo in ihr.</translation>
+    </message>
+    <message>
+        <source>Bearing of the middle of the photo.</source>
+        <translation>Richtung der Mitte des Fotos.</translation>
+    </message>
+    <message>
+        <source>Bearing of the photo</source>
+        <translation>Blickrichtung des Fotos</translation>
+    </message>
+    <message>
+        <source>Bearings</source>
+        <translation>Richtungen</translation>
+    </message>
+    <message>
+        <source>Benchmark on photographs</source>
+        <translation>Vergleich auf Fotos</translation>
+    </message>
+    <message>
         <source>Box in degrees, a polygon file, or the name of a place.</source>
         <translation>Rechteck in Grad, eine Datei mit Polygonen oder der Name eines Ortes.</translation>
     </message>
@@ -116,6 +180,10 @@
         <translation>KBS zum Arbeiten</translation>
     </message>
     <message>
+        <source>Calibrate the answers</source>
+        <translation>Antworten kalibrieren</translation>
+    </message>
+    <message>
         <source>Camera data</source>
         <translation>Kameradaten</translation>
     </message>
@@ -134,6 +202,10 @@
     <message>
         <source>Candidates</source>
         <translation>Kandidaten</translation>
+    </message>
+    <message>
+        <source>Candidates that count</source>
+        <translation>Kandidaten, die zählen</translation>
     </message>
     <message>
         <source>Cannot tell: 90 % of the chance is in {cells} cells, and {chance} within {metres} m of the best place.</source>
@@ -188,6 +260,10 @@
         <translation>Wahrscheinlichkeit</translation>
     </message>
     <message>
+        <source>Chance of the regions</source>
+        <translation>Wahrscheinlichkeit der Gebiete</translation>
+    </message>
+    <message>
         <source>Changes</source>
         <translation>Änderungen</translation>
     </message>
@@ -200,8 +276,16 @@
         <translation>Wählen Sie eine Signaturdatenbank und öffnen Sie sie.</translation>
     </message>
     <message>
+        <source>Choose from which chance on a place is given as an answer.</source>
+        <translation>Wählt, ab welcher Wahrscheinlichkeit ein Ort als Antwort genannt wird.</translation>
+    </message>
+    <message>
         <source>Choose what you see, and click its direction in the dial. Click an object to remove it.</source>
         <translation>Wählen Sie, was Sie sehen, und klicken Sie seine Richtung in der Windrose an. Ein Klick auf ein Objekt entfernt es.</translation>
+    </message>
+    <message>
+        <source>Class of false objects</source>
+        <translation>Klasse falscher Objekte</translation>
     </message>
     <message>
         <source>Clear</source>
@@ -224,12 +308,40 @@
         <translation>Objekte einer Klasse am selben Ort zusammenfassen.</translation>
     </message>
     <message>
+        <source>Compare results</source>
+        <translation>Ergebnisse vergleichen</translation>
+    </message>
+    <message>
+        <source>Compare two results of queries from the same places.</source>
+        <translation>Vergleicht zwei Ergebnisse von Anfragen von denselben Orten.</translation>
+    </message>
+    <message>
         <source>Composes the view that is seen from a place of the map.</source>
         <translation>Stellt zusammen, was man von einer Stelle der Karte aus sieht.</translation>
     </message>
     <message>
         <source>Corner of a cell in metres, in the CRS of the objects.</source>
         <translation>Ecke einer Zelle in Metern, im KBS der Objekte.</translation>
+    </message>
+    <message>
+        <source>Count the best of this many candidates (t).</source>
+        <translation>Den besten von so vielen Kandidaten zählen (t).</translation>
+    </message>
+    <message>
+        <source>Data set</source>
+        <translation>Datensatz</translation>
+    </message>
+    <message>
+        <source>Data set: flatlandia or london-lights.</source>
+        <translation>Datensatz: flatlandia oder london-lights.</translation>
+    </message>
+    <message>
+        <source>Database of another city</source>
+        <translation>Datenbank einer anderen Stadt</translation>
+    </message>
+    <message>
+        <source>Database of another city: also count how many of its views are answered, which is wrong for all of them.</source>
+        <translation>Datenbank einer anderen Stadt: auch zählen, wie viele ihrer Ansichten beantwortet werden, was bei allen falsch ist.</translation>
     </message>
     <message>
         <source>Database to write.</source>
@@ -240,6 +352,14 @@
         <translation>Datenbanken</translation>
     </message>
     <message>
+        <source>Day of the view</source>
+        <translation>Tag der Ansicht</translation>
+    </message>
+    <message>
+        <source>Day of the view, for magnetic north.</source>
+        <translation>Tag der Ansicht, für magnetischen Norden.</translation>
+    </message>
+    <message>
         <source>Default street width, where --streets has none.</source>
         <translation>Straßenbreite, wo --streets keine angibt.</translation>
     </message>
@@ -248,8 +368,20 @@
         <translation>Ohne Angabe: {}.</translation>
     </message>
     <message>
+        <source>Degrees clockwise from north, such as 10,80,200,310.</source>
+        <translation>Grad von Norden an im Uhrzeigersinn, etwa 10,80,200,310.</translation>
+    </message>
+    <message>
         <source>Demonstration</source>
         <translation>Vorführung</translation>
+    </message>
+    <message>
+        <source>Detections of known places</source>
+        <translation>Detektionen bekannter Orte</translation>
+    </message>
+    <message>
+        <source>Detections of known places: a CSV or JSON lines file of views with x and y (metres) or cell_id (its centre).</source>
+        <translation>Detektionen bekannter Orte: eine Datei von Ansichten als CSV oder JSON-Zeilen mit x und y (Meter) oder cell_id (ihrer Mitte).</translation>
     </message>
     <message>
         <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary or Panoramax JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: photographs, or folders of them.</source>
@@ -262,6 +394,22 @@
     <message>
         <source>Direction of the camera, clockwise from north.</source>
         <translation>Richtung der Kamera, von Norden an im Uhrzeigersinn.</translation>
+    </message>
+    <message>
+        <source>Distance to add around the cells of --out.</source>
+        <translation>Abstand, der um die Zellen von --out hinzukommt.</translation>
+    </message>
+    <message>
+        <source>Distort queries: none, light, medium or strong, or several, such as medium,compass:10,view:90.</source>
+        <translation>Anfragen verfälschen: none (gar nicht), light (wenig), medium (mittel) oder strong (stark), oder mehrere, etwa medium,compass:10,view:90.</translation>
+    </message>
+    <message>
+        <source>Distortion</source>
+        <translation>Verfälschung</translation>
+    </message>
+    <message>
+        <source>Do not sort the objects again after the bearing noise.</source>
+        <translation>Die Objekte nach den Fehlern der Richtungen nicht neu ordnen.</translation>
     </message>
     <message>
         <source>Download OpenStreetMap for this canvas</source>
@@ -332,6 +480,34 @@
         <translation>Fehler der Blickrichtung</translation>
     </message>
     <message>
+        <source>Errors of the detector</source>
+        <translation>Fehler des Detektors</translation>
+    </message>
+    <message>
+        <source>Errors of the detector or person: light, medium, strong, generic (any of them), by-hand, photo, panorama, or a file written by `semsig learn`.</source>
+        <translation>Fehler des Detektors oder Menschen: light (wenige), medium (mittel), strong (viele), generic (eins davon), by-hand, photo, panorama oder eine Datei, die `semsig learn` geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>Errors of the detector: light, medium, strong, generic (any of them), by-hand (a person, who leaves some out), photo, panorama, or a file written by `semsig learn`.</source>
+        <translation>Fehler des Detektors: light (wenige), medium (mittel), strong (viele), generic (eins davon), by-hand (ein Mensch, der manche weglässt), photo, panorama oder eine Datei, die `semsig learn` geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>Evaluate</source>
+        <translation>Auswerten</translation>
+    </message>
+    <message>
+        <source>Experiment</source>
+        <translation>Experiment</translation>
+    </message>
+    <message>
+        <source>Experiment, a .toml file.</source>
+        <translation>Experiment, eine .toml-Datei.</translation>
+    </message>
+    <message>
+        <source>Explain the best places</source>
+        <translation>Die besten Orte erklären</translation>
+    </message>
+    <message>
         <source>Explore a city</source>
         <translation>Stadt erkunden</translation>
     </message>
@@ -348,8 +524,24 @@
         <translation>Blickfeld</translation>
     </message>
     <message>
+        <source>Field of view of a photo, around --look.</source>
+        <translation>Blickfeld eines Fotos, um --look herum.</translation>
+    </message>
+    <message>
+        <source>Field of view of a query, in any direction.</source>
+        <translation>Blickfeld einer Anfrage, in beliebiger Richtung.</translation>
+    </message>
+    <message>
         <source>File</source>
         <translation>Datei</translation>
+    </message>
+    <message>
+        <source>File of many queries, as CSV or JSON lines, or - for JSON lines from standard input. Prints a line of JSON for each: an answer or an error.</source>
+        <translation>Datei mit vielen Anfragen als CSV oder JSON-Zeilen, oder - für JSON-Zeilen von der Standardeingabe. Gibt für jede eine Zeile JSON aus: eine Antwort oder einen Fehler.</translation>
+    </message>
+    <message>
+        <source>File of queries</source>
+        <translation>Datei mit Anfragen</translation>
     </message>
     <message>
         <source>File to write</source>
@@ -358,6 +550,10 @@
     <message>
         <source>File to write. Its suffix is the format: .gpkg (all layers, for QGIS), .parquet, .fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), .tif (one number per cell) or .json (STAC item).</source>
         <translation>Datei, die geschrieben wird. Ihre Endung ist das Format: .gpkg (alle Layer, für QGIS), .parquet, .fgb, .geojson oder .csv (ein Layer), .pmtiles (Zellen für Webkarten), .tif (eine Zahl je Zelle) oder .json (STAC-Eintrag).</translation>
+    </message>
+    <message>
+        <source>File to write: search regions and candidates for QGIS (.gpkg) or in degrees (.geojson, .kml), only the regions (.parquet, .fgb, .csv), or the chance of every cell (.tif).</source>
+        <translation>Datei, die geschrieben wird: Gebiete und Kandidaten für QGIS (.gpkg) oder in Grad (.geojson, .kml), nur die Gebiete (.parquet, .fgb, .csv) oder die Wahrscheinlichkeit jeder Zelle (.tif).</translation>
     </message>
     <message>
         <source>Files</source>
@@ -376,12 +572,36 @@
         <translation>Ort suchen</translation>
     </message>
     <message>
+        <source>Find where a view was seen from, or many views.</source>
+        <translation>Findet, von wo eine Ansicht oder viele Ansichten stammen.</translation>
+    </message>
+    <message>
+        <source>Find where the views of a route were seen from.</source>
+        <translation>Findet, von wo die Ansichten eines Weges stammen.</translation>
+    </message>
+    <message>
         <source>First database</source>
         <translation>Erste Datenbank</translation>
     </message>
     <message>
+        <source>First noise model</source>
+        <translation>Erstes Fehlermodell</translation>
+    </message>
+    <message>
+        <source>First noise model for --unlabelled, a name or a file.</source>
+        <translation>Erstes Fehlermodell für --unlabelled, ein Name oder eine Datei.</translation>
+    </message>
+    <message>
         <source>Folder</source>
         <translation>Ordner</translation>
+    </message>
+    <message>
+        <source>Folder for the results</source>
+        <translation>Ordner für die Ergebnisse</translation>
+    </message>
+    <message>
+        <source>Folder of an experiment or of an evaluation.</source>
+        <translation>Ordner eines Experiments oder einer Auswertung.</translation>
     </message>
     <message>
         <source>Folder of results</source>
@@ -394,6 +614,10 @@
     <message>
         <source>Folder of the cache.</source>
         <translation>Ordner des Zwischenspeichers.</translation>
+    </message>
+    <message>
+        <source>Folder of the check</source>
+        <translation>Ordner der Prüfung</translation>
     </message>
     <message>
         <source>Folder of the pictures</source>
@@ -412,8 +636,24 @@
         <translation>Ordner mit Wheels (leer lassen, um sie herunterzuladen)</translation>
     </message>
     <message>
+        <source>Folder to write a report of the check to.</source>
+        <translation>Der Ordner, in den ein Bericht der Prüfung geschrieben wird.</translation>
+    </message>
+    <message>
+        <source>Folder to write the report and results to.</source>
+        <translation>Der Ordner, in den Bericht und Ergebnisse geschrieben werden.</translation>
+    </message>
+    <message>
+        <source>Folder to write the results to.</source>
+        <translation>Der Ordner, in den die Ergebnisse geschrieben werden.</translation>
+    </message>
+    <message>
         <source>Folder to write to.</source>
         <translation>Der Ordner, in den geschrieben wird.</translation>
+    </message>
+    <message>
+        <source>Folder with the files of the data set.</source>
+        <translation>Ordner mit den Dateien des Datensatzes.</translation>
     </message>
     <message>
         <source>Folder written by `semsig evaluate --out`, to add its queries.</source>
@@ -432,8 +672,20 @@
         <translation>Gefunden: Der Ort liegt mit einer Wahrscheinlichkeit von {chance} im Umkreis von {metres} m.</translation>
     </message>
     <message>
+        <source>From the centres of cells</source>
+        <translation>Aus der Mitte von Zellen</translation>
+    </message>
+    <message>
         <source>From the true to the best place</source>
         <translation>Vom wahren zum besten Ort</translation>
+    </message>
+    <message>
+        <source>GPX track</source>
+        <translation>GPX-Track</translation>
+    </message>
+    <message>
+        <source>GPX track of the route, matched by the time of each view, or with one point for each view.</source>
+        <translation>GPX-Track des Weges, nach der Zeit jeder Ansicht zugeordnet oder mit einem Punkt für jede Ansicht.</translation>
     </message>
     <message>
         <source>GeoPackage</source>
@@ -468,6 +720,10 @@
         <translation>Wie eine Zelle gezeichnet wird: als Polygon (polygon) oder Punkt (point).</translation>
     </message>
     <message>
+        <source>How the class of a false object is drawn.</source>
+        <translation>Wie die Klasse eines falschen Objekts gezogen wird.</translation>
+    </message>
+    <message>
         <source>Identifiability</source>
         <translation>Erkennbarkeit</translation>
     </message>
@@ -496,6 +752,10 @@
         <translation>Nur die Zellen in diesem Rechteck in Grad oder in Polygonen behalten.</translation>
     </message>
     <message>
+        <source>Keep the order of the objects</source>
+        <translation>Reihenfolge der Objekte behalten</translation>
+    </message>
+    <message>
         <source>Largest distortion allowed for the CRS: degrees of bearings, percent of lengths.</source>
         <translation>Größte zulässige Verzerrung des KBS: Grad bei Richtungen, Prozent bei Längen.</translation>
     </message>
@@ -504,12 +764,36 @@
         <translation>Größte Verzerrung des KBS</translation>
     </message>
     <message>
+        <source>Largest error</source>
+        <translation>Größter Fehler</translation>
+    </message>
+    <message>
+        <source>Largest error that counts as found.</source>
+        <translation>Größter Fehler, der als gefunden gilt.</translation>
+    </message>
+    <message>
+        <source>Last known place</source>
+        <translation>Letzter bekannter Ort</translation>
+    </message>
+    <message>
+        <source>Last known place, in degrees or as X,Y,SIGMA in the CRS of the database, SIGMA in metres.</source>
+        <translation>Letzter bekannter Ort, in Grad oder als X,Y,SIGMA im KBS der Datenbank, SIGMA in Metern.</translation>
+    </message>
+    <message>
         <source>Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; by default cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the default), identifiability, error, or field (share of the queries around that fail).</source>
         <translation>Layer, der geschrieben wird: cells, objects, evaluation, evaluation_lines oder hexagons; ohne Angabe cells, in einem .gpkg alle (mehrere sind möglich). In einem .tif: ambiguity (ohne Angabe), identifiability, error oder field (Anteil der Anfragen im Umkreis, die scheitern).</translation>
     </message>
     <message>
         <source>Layers</source>
         <translation>Layer</translation>
+    </message>
+    <message>
+        <source>Learn detector errors</source>
+        <translation>Fehler eines Detektors lernen</translation>
+    </message>
+    <message>
+        <source>Learn the errors of a detector from detections of known places, or only from its views.</source>
+        <translation>Lernt die Fehler eines Detektors aus Detektionen bekannter Orte oder nur aus seinen Ansichten.</translation>
     </message>
     <message>
         <source>Leave out boxes with a lower score.</source>
@@ -526,6 +810,18 @@
     <message>
         <source>Load street objects</source>
         <translation>Straßenobjekte laden</translation>
+    </message>
+    <message>
+        <source>Localization</source>
+        <translation>Verortung</translation>
+    </message>
+    <message>
+        <source>Localize</source>
+        <translation>Verorten</translation>
+    </message>
+    <message>
+        <source>Localize a route</source>
+        <translation>Weg verorten</translation>
     </message>
     <message>
         <source>Looking for Python...</source>
@@ -560,6 +856,18 @@
         <translation>Zuordnungen der Bezeichnungen</translation>
     </message>
     <message>
+        <source>Margin of the regions</source>
+        <translation>Rand der Gebiete</translation>
+    </message>
+    <message>
+        <source>Measure how often, and how closely, queries from known places are located.</source>
+        <translation>Misst, wie oft und wie genau Anfragen von bekannten Orten verortet werden.</translation>
+    </message>
+    <message>
+        <source>Measure methods on real photographs with known places.</source>
+        <translation>Misst Verfahren an echten Fotos mit bekannten Orten.</translation>
+    </message>
+    <message>
         <source>Merge objects of different layers within the catalogue's radii.</source>
         <translation>Objekte verschiedener Layer innerhalb der Radien des Katalogs zusammenlegen.</translation>
     </message>
@@ -580,6 +888,38 @@
         <translation>Zusammengelegte Datenbank</translation>
     </message>
     <message>
+        <source>Method</source>
+        <translation>Methode</translation>
+    </message>
+    <message>
+        <source>Method of the paper</source>
+        <translation>Verfahren des Aufsatzes</translation>
+    </message>
+    <message>
+        <source>Methods</source>
+        <translation>Verfahren</translation>
+    </message>
+    <message>
+        <source>Methods with commas between them; --out has the worst failures of the last one.</source>
+        <translation>Verfahren, durch Kommas getrennt; --out enthält die schlimmsten Fehlschläge des letzten.</translation>
+    </message>
+    <message>
+        <source>Missed and false objects that the age of the map explains do not count.</source>
+        <translation>Übersehene und falsche Objekte, die das Alter der Karte erklärt, zählen nicht.</translation>
+    </message>
+    <message>
+        <source>More databases</source>
+        <translation>Weitere Datenbanken</translation>
+    </message>
+    <message>
+        <source>More databases before what was seen: the view may be from any of these cities.</source>
+        <translation>Weitere Datenbanken vor dem, was zu sehen war: die Ansicht kann aus jeder dieser Städte stammen.</translation>
+    </message>
+    <message>
+        <source>Most views</source>
+        <translation>Meiste Ansichten</translation>
+    </message>
+    <message>
         <source>New street objects</source>
         <translation>Neue Straßenobjekte</translation>
     </message>
@@ -588,16 +928,56 @@
         <translation>Neue Straßenobjekte; ihre Layer ersetzen Layer der Datenbank.</translation>
     </message>
     <message>
+        <source>Noise model</source>
+        <translation>Fehlermodell</translation>
+    </message>
+    <message>
+        <source>Noise model of the method learned, written by `semsig learn`.</source>
+        <translation>Fehlermodell des Verfahrens learned, von `semsig learn` geschrieben.</translation>
+    </message>
+    <message>
+        <source>Noise model to write (.toml or .json), for --noise.</source>
+        <translation>Fehlermodell, das geschrieben wird (.toml oder .json), für --noise.</translation>
+    </message>
+    <message>
+        <source>North from which bearings are measured; grid north is that of the database.</source>
+        <translation>Norden, von dem aus Richtungen gemessen werden; Gitternord ist der der Datenbank.</translation>
+    </message>
+    <message>
+        <source>North is</source>
+        <translation>Norden ist</translation>
+    </message>
+    <message>
         <source>North is unknown</source>
         <translation>Norden unbekannt</translation>
+    </message>
+    <message>
+        <source>North of the bearings</source>
+        <translation>Norden der Richtungen</translation>
+    </message>
+    <message>
+        <source>Number of candidates</source>
+        <translation>Anzahl der Kandidaten</translation>
+    </message>
+    <message>
+        <source>Number of candidates.</source>
+        <translation>Anzahl der Kandidaten.</translation>
     </message>
     <message>
         <source>Number of equal sectors in which the methods of the paper compare bearings.</source>
         <translation>Anzahl gleicher Sektoren, in denen die Verfahren des Aufsatzes Richtungen vergleichen.</translation>
     </message>
     <message>
+        <source>Number of new queries to check the predictions with.</source>
+        <translation>Anzahl neuer Anfragen, mit denen die Vorhersagen geprüft werden.</translation>
+    </message>
+    <message>
         <source>Number of processes on this machine.</source>
         <translation>Anzahl der Prozesse auf diesem Rechner.</translation>
+    </message>
+    <message>
+        <source>Number of processes, 0 to use this one only.</source>
+        <translation>Anzahl der Prozesse, 0 für nur diesen einen.</translation>
     </message>
     <message>
         <source>Number of queries</source>
@@ -606,6 +986,14 @@
     <message>
         <source>Number of queries to ask.</source>
         <translation>Anzahl der Anfragen, die gestellt werden.</translation>
+    </message>
+    <message>
+        <source>Number of queries.</source>
+        <translation>Anzahl der Anfragen.</translation>
+    </message>
+    <message>
+        <source>Number of threads.</source>
+        <translation>Anzahl der Threads.</translation>
     </message>
     <message>
         <source>Object detector</source>
@@ -672,6 +1060,22 @@
         <translation>Ort</translation>
     </message>
     <message>
+        <source>Popularity of places</source>
+        <translation>Beliebtheit von Orten</translation>
+    </message>
+    <message>
+        <source>Precision</source>
+        <translation>Genauigkeit</translation>
+    </message>
+    <message>
+        <source>Predict how well queries from each cell will be located.</source>
+        <translation>Sagt voraus, wie gut Anfragen aus jeder Zelle verortet werden.</translation>
+    </message>
+    <message>
+        <source>Predict the accuracy</source>
+        <translation>Genauigkeit vorhersagen</translation>
+    </message>
+    <message>
         <source>Print the properties of a database next to those in the paper.</source>
         <translation>Zeigt die Eigenschaften einer Datenbank neben denen im Aufsatz.</translation>
     </message>
@@ -704,6 +1108,10 @@
         <translation>Anfragen</translation>
     </message>
     <message>
+        <source>Queries to check the predictions</source>
+        <translation>Anfragen zur Prüfung der Vorhersagen</translation>
+    </message>
+    <message>
         <source>Radius of smoothing</source>
         <translation>Radius der Glättung</translation>
     </message>
@@ -714,6 +1122,30 @@
     <message>
         <source>Rank</source>
         <translation>Rang</translation>
+    </message>
+    <message>
+        <source>Rank as the paper does: --method edit+edit:5%.</source>
+        <translation>Ordnen wie der Aufsatz: --method edit+edit:5%.</translation>
+    </message>
+    <message>
+        <source>Rank by likelihood, or by distance as TYPES+ANGLES (edit, histogram, jaccard), types:edit or angles:edit; add :5% for two stages, :alpha=0.7, :raw or :weights=INSERT/DELETE/SUBSTITUTE.</source>
+        <translation>Nach Wahrscheinlichkeit ordnen (likelihood) oder nach Distanz als TYPES+ANGLES (edit, histogram, jaccard), types:edit oder angles:edit; dazu :5% für zwei Stufen, :alpha=0.7, :raw oder :weights=INSERT/DELETE/SUBSTITUTE.</translation>
+    </message>
+    <message>
+        <source>Raster of how likely each place is beforehand, such as population.</source>
+        <translation>Raster, das sagt, wie wahrscheinlich jeder Ort im Voraus ist, etwa die Bevölkerung.</translation>
+    </message>
+    <message>
+        <source>Raster to write (.tif).</source>
+        <translation>Raster, das geschrieben wird (.tif).</translation>
+    </message>
+    <message>
+        <source>Rate at which the city changes, for --map-age: output of `semsig update --years N --json`, or a .toml file with the same keys.</source>
+        <translation>Rate, mit der sich die Stadt ändert, für --map-age: Ausgabe von `semsig update --years N --json` oder eine .toml-Datei mit denselben Schlüsseln.</translation>
+    </message>
+    <message>
+        <source>Rate of change</source>
+        <translation>Änderungsrate</translation>
     </message>
     <message>
         <source>Read files of open data into street objects.</source>
@@ -748,6 +1180,18 @@
         <translation>Entfernt übrig gebliebene Dateien neben einer Datenbank.</translation>
     </message>
     <message>
+        <source>Repeat the paper's experiments</source>
+        <translation>Experimente des Aufsatzes wiederholen</translation>
+    </message>
+    <message>
+        <source>Repeat the paper's experiments and compare the results.</source>
+        <translation>Wiederholt die Experimente des Aufsatzes und vergleicht die Ergebnisse.</translation>
+    </message>
+    <message>
+        <source>Report page</source>
+        <translation>Berichtsseite</translation>
+    </message>
+    <message>
         <source>Resolution of hexagons</source>
         <translation>Auflösung der Sechsecke</translation>
     </message>
@@ -760,20 +1204,76 @@
         <translation>Ergebnisse</translation>
     </message>
     <message>
+        <source>Results to write (.json).</source>
+        <translation>Ergebnisse, die geschrieben werden (.json).</translation>
+    </message>
+    <message>
         <source>Roll</source>
         <translation>Rollwinkel</translation>
+    </message>
+    <message>
+        <source>Rough distances</source>
+        <translation>Ungefähre Entfernungen</translation>
+    </message>
+    <message>
+        <source>Rough distances: metres, near, middle, far or ?, such as 12,?,near.</source>
+        <translation>Ungefähre Entfernungen: Meter, near (nah), middle (mittel), far (fern) oder ?, etwa 12,?,near.</translation>
+    </message>
+    <message>
+        <source>Rule for answers</source>
+        <translation>Regel für Antworten</translation>
+    </message>
+    <message>
+        <source>Rule for when to answer, written by `semsig calibrate`.</source>
+        <translation>Regel, wann geantwortet wird, von `semsig calibrate` geschrieben.</translation>
+    </message>
+    <message>
+        <source>Rule to write (.json), for --rule.</source>
+        <translation>Regel, die geschrieben wird (.json), für --rule.</translation>
+    </message>
+    <message>
+        <source>Run an experiment</source>
+        <translation>Experiment ausführen</translation>
     </message>
     <message>
         <source>Run every step on a small made-up city, offline.</source>
         <translation>Führt jeden Schritt mit einer kleinen erfundenen Stadt aus, ohne Netz.</translation>
     </message>
     <message>
+        <source>Run the evaluations of an experiment, or resume them.</source>
+        <translation>Führt die Auswertungen eines Experiments aus oder setzt sie fort.</translation>
+    </message>
+    <message>
+        <source>Run the paper's 10,000 queries, or 300 in a small city.</source>
+        <translation>Die 10.000 Anfragen des Aufsatzes ausführen oder 300 in einer kleinen Stadt.</translation>
+    </message>
+    <message>
         <source>Scheduler</source>
         <translation>Scheduler</translation>
     </message>
     <message>
+        <source>Search between the centres of cells</source>
+        <translation>Zwischen den Mitten der Zellen suchen</translation>
+    </message>
+    <message>
+        <source>Search only cells that see this: M (one or more), 2B (two or more), B=0 (none), ?&lt;=10 (at most ten objects).</source>
+        <translation>Nur Zellen durchsuchen, die das sehen: M (mindestens eins), 2B (mindestens zwei), B=0 (keins), ?&lt;=10 (höchstens zehn Objekte).</translation>
+    </message>
+    <message>
+        <source>Search only in this box in degrees, or in the polygons of a file.</source>
+        <translation>Nur in diesem Rechteck in Grad oder in den Polygonen einer Datei suchen.</translation>
+    </message>
+    <message>
         <source>Second database</source>
         <translation>Zweite Datenbank</translation>
+    </message>
+    <message>
+        <source>Sectors</source>
+        <translation>Sektoren</translation>
+    </message>
+    <message>
+        <source>Sectors that were looked at, if not the full turn, such as 20-90,180-250.</source>
+        <translation>Sektoren, in die geblickt wurde, wenn nicht ringsum, etwa 20-90,180-250.</translation>
     </message>
     <message>
         <source>Seed</source>
@@ -808,8 +1308,16 @@
         <translation>Form einer Zelle</translation>
     </message>
     <message>
+        <source>Share of the answers that should be right.</source>
+        <translation>Anteil der Antworten, die stimmen sollen.</translation>
+    </message>
+    <message>
         <source>Show how many cells see the same types in the same order.</source>
         <translation>Zeigt, wie viele Zellen dieselben Typen in derselben Reihenfolge sehen.</translation>
+    </message>
+    <message>
+        <source>Show which objects of the view match which street objects, which were missed and which look false.</source>
+        <translation>Zeigen, welche Objekte der Ansicht zu welchen Straßenobjekten passen, welche übersehen wurden und welche falsch aussehen.</translation>
     </message>
     <message>
         <source>Shows what is seen from a cell, and the most similar cells.</source>
@@ -868,6 +1376,10 @@
         <translation>Größe der Bilder, wo sie unbekannt ist, etwa 1920x1080.</translation>
     </message>
     <message>
+        <source>Size of the experiments</source>
+        <translation>Umfang der Experimente</translation>
+    </message>
+    <message>
         <source>Size of the pictures</source>
         <translation>Größe der Bilder</translation>
     </message>
@@ -904,12 +1416,32 @@
         <translation>Straßenobjekte, die `semsig load` geschrieben hat.</translation>
     </message>
     <message>
+        <source>Street objects: a file written by `semsig load`, or an object store.</source>
+        <translation>Straßenobjekte: eine Datei, die `semsig load` geschrieben hat, oder ein Objektspeicher.</translation>
+    </message>
+    <message>
         <source>Street width</source>
         <translation>Straßenbreite</translation>
     </message>
     <message>
         <source>Streets</source>
         <translation>Straßen</translation>
+    </message>
+    <message>
+        <source>Suggest what to look for</source>
+        <translation>Vorschlagen, wonach zu schauen ist</translation>
+    </message>
+    <message>
+        <source>Suggest what to look for next, most useful first.</source>
+        <translation>Schlägt vor, wonach als Nächstes zu schauen ist, das Nützlichste zuerst.</translation>
+    </message>
+    <message>
+        <source>Surely from this area</source>
+        <translation>Sicher aus diesem Gebiet</translation>
+    </message>
+    <message>
+        <source>Symbols clockwise from north, such as DDBL; ? where one is unknown.</source>
+        <translation>Symbole von Norden an im Uhrzeigersinn, etwa DDBL; ? für ein unbekanntes.</translation>
     </message>
     <message>
         <source>The city is divided into square cells. For each it is stored which street objects are seen from its centre, clockwise from north: its signature. Cells that see nothing are left out. A folder with the street objects, ready to be searched, is written next to the database.</source>
@@ -940,6 +1472,10 @@
         <translation>Die Engine wurde entfernt.</translation>
     </message>
     <message>
+        <source>The layers, in a GeoPackage.</source>
+        <translation>Die Layer, in einem GeoPackage.</translation>
+    </message>
+    <message>
         <source>The places that a view from here may be confused with, by chance:</source>
         <translation>Die Orte, mit denen eine Ansicht von hier verwechselt werden kann, nach Wahrscheinlichkeit:</translation>
     </message>
@@ -968,6 +1504,10 @@
         <translation>Das sieht man von dort; ändern Sie es oder suchen Sie den Ort.</translation>
     </message>
     <message>
+        <source>Threads</source>
+        <translation>Threads</translation>
+    </message>
+    <message>
         <source>Tile size</source>
         <translation>Kachelgröße</translation>
     </message>
@@ -988,8 +1528,16 @@
         <translation>Titel</translation>
     </message>
     <message>
+        <source>Total chance of the regions of --out.</source>
+        <translation>Gesamte Wahrscheinlichkeit der Gebiete von --out.</translation>
+    </message>
+    <message>
         <source>Turn the boxes of an object detector into views for semsig localize.</source>
         <translation>Macht aus den Rahmen eines Objektdetektors Ansichten für semsig localize.</translation>
+    </message>
+    <message>
+        <source>Types</source>
+        <translation>Arten</translation>
     </message>
     <message>
         <source>Update signature database</source>
@@ -998,6 +1546,10 @@
     <message>
         <source>Updated database</source>
         <translation>Aktualisierte Datenbank</translation>
+    </message>
+    <message>
+        <source>Use at most this many views a set.</source>
+        <translation>Höchstens so viele Ansichten je Teil verwenden.</translation>
     </message>
     <message>
         <source>Use the cache only.</source>
@@ -1024,6 +1576,18 @@
         <translation>Ansichten aus Detektionen</translation>
     </message>
     <message>
+        <source>Views in their order: a CSV or JSON lines file, or - for JSON lines from standard input. Each after the first has the step from the previous view, dx,dy or distance,bearing (metres, degrees), and its sigma; or use --track.</source>
+        <translation>Ansichten in ihrer Reihenfolge: eine Datei mit CSV oder JSON-Zeilen, oder - für JSON-Zeilen von der Standardeingabe. Jede nach der ersten hat den Schritt von der vorigen Ansicht, dx,dy oder distance,bearing (Meter, Grad), und dessen sigma; oder nehmen Sie --track.</translation>
+    </message>
+    <message>
+        <source>Views of one camera and detector at unknown places, instead of --samples: a CSV or JSON lines file, as of semsig localize --queries.</source>
+        <translation>Ansichten einer Kamera und eines Detektors von unbekannten Orten, statt --samples: eine Datei mit CSV oder JSON-Zeilen wie bei semsig localize --queries.</translation>
+    </message>
+    <message>
+        <source>Views of unknown places</source>
+        <translation>Ansichten unbekannter Orte</translation>
+    </message>
+    <message>
         <source>Views to write (.jsonl), for --queries.</source>
         <translation>Ansichten, die geschrieben werden (.jsonl), für --queries.</translation>
     </message>
@@ -1036,8 +1600,28 @@
         <translation>Sichtweite für Klassen, für die der Katalog keine nennt.</translation>
     </message>
     <message>
+        <source>Visibility range.</source>
+        <translation>Sichtweite.</translation>
+    </message>
+    <message>
+        <source>What was seen</source>
+        <translation>Was zu sehen war</translation>
+    </message>
+    <message>
+        <source>What was seen, clockwise from north: symbols such as DDBL, or words, as 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'.</source>
+        <translation>Was zu sehen war, von Norden an im Uhrzeigersinn: Symbole wie DDBL oder (englische) Wörter, etwa 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'.</translation>
+    </message>
+    <message>
+        <source>Whether north is known: known, unknown, or its standard deviation in degrees, 0.001 to 360.</source>
+        <translation>Ob Norden bekannt ist: known (bekannt), unknown (unbekannt) oder die Standardabweichung in Grad, 0.001 bis 360.</translation>
+    </message>
+    <message>
         <source>Without a network</source>
         <translation>Ohne Netz</translation>
+    </message>
+    <message>
+        <source>Write a page with curves, a map and the worst failures (.html).</source>
+        <translation>Eine Seite mit Kurven, einer Karte und den schlimmsten Fehlschlägen schreiben (.html).</translation>
     </message>
     <message>
         <source>Write a title on the map, such as the city and the date of its data.</source>
@@ -1052,8 +1636,20 @@
         <translation>Jahre zwischen den alten und den neuen Objekten, für den Bericht von --json.</translation>
     </message>
     <message>
+        <source>a made-up Paris</source>
+        <translation>ein erfundenes Paris</translation>
+    </message>
+    <message>
         <source>all built-in maps</source>
         <translation>alle eingebauten</translation>
+    </message>
+    <message>
+        <source>all processors</source>
+        <translation>alle Prozessoren</translation>
+    </message>
+    <message>
+        <source>all processors, 0 for --size small</source>
+        <translation>alle Prozessoren, 0 bei --size small</translation>
     </message>
     <message>
         <source>as a polygon, in CSV as a point</source>
@@ -1062,6 +1658,10 @@
     <message>
         <source>as many cells as Paris</source>
         <translation>so viele Zellen wie Paris</translation>
+    </message>
+    <message>
+        <source>by-hand for a view in words, photo for a view of sectors, panorama for a full turn with scores, otherwise generic</source>
+        <translation>by-hand für eine Ansicht in Worten, photo für eine Ansicht aus Sektoren, panorama für ringsum mit Konfidenzwerten, sonst generic</translation>
     </message>
     <message>
         <source>downloaded</source>
@@ -1084,12 +1684,28 @@
         <translation>aus EXIF; 360 bei einem Panorama</translation>
     </message>
     <message>
+        <source>from a chance of 0.9</source>
+        <translation>ab einer Wahrscheinlichkeit von 0,9</translation>
+    </message>
+    <message>
         <source>from the database</source>
         <translation>aus der Datenbank</translation>
     </message>
     <message>
+        <source>full turn</source>
+        <translation>ringsum</translation>
+    </message>
+    <message>
         <source>in place</source>
         <translation>an Ort und Stelle</translation>
+    </message>
+    <message>
+        <source>learn it</source>
+        <translation>wird gelernt</translation>
+    </message>
+    <message>
+        <source>likelihood</source>
+        <translation>likelihood</translation>
     </message>
     <message>
         <source>looked for</source>
@@ -1124,6 +1740,14 @@
         <translation>der von semsig</translation>
     </message>
     <message>
+        <source>that of --size</source>
+        <translation>die von --size</translation>
+    </message>
+    <message>
+        <source>that of Monaco in OpenStreetMap</source>
+        <translation>die von Monaco in OpenStreetMap</translation>
+    </message>
+    <message>
         <source>the catalogue's or the UTM zone</source>
         <translation>das des Katalogs oder die UTM-Zone</translation>
     </message>
@@ -1140,8 +1764,24 @@
         <translation>der Name der Datei der Datenbank</translation>
     </message>
     <message>
+        <source>the store of the database</source>
+        <translation>der Speicher der Datenbank</translation>
+    </message>
+    <message>
+        <source>today</source>
+        <translation>heute</translation>
+    </message>
+    <message>
         <source>under 1 %</source>
         <translation>unter 1 %</translation>
+    </message>
+    <message>
+        <source>uniform</source>
+        <translation>uniform (gleichmäßig)</translation>
+    </message>
+    <message>
+        <source>where there are street objects and bearings</source>
+        <translation>wo es Straßenobjekte und Richtungen gibt</translation>
     </message>
     <message>
         <source>years</source>
@@ -1150,6 +1790,10 @@
     <message>
         <source>{name}: {cells} cells. Click a cell, or compose what you see.</source>
         <translation>{name}: {cells} Zellen. Klicken Sie eine Zelle an oder stellen Sie zusammen, was Sie sehen.</translation>
+    </message>
+    <message>
+        <source>{title}: {part}</source>
+        <translation>{title}: {part}</translation>
     </message>
     <message>
         <source>°</source>

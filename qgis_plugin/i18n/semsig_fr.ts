@@ -4,6 +4,14 @@
 <context>
     <name>Semsig</name>
     <message>
+        <source>--explain, --share and the options from --noise to --objects work only with the likelihood method.</source>
+        <translation>--explain, --share et les options de --noise à --objects ne valent qu’avec la méthode likelihood.</translation>
+    </message>
+    <message>
+        <source>0.9</source>
+        <translation>0,9</translation>
+    </message>
+    <message>
         <source>10 from EXIF; otherwise left to semsig localize</source>
         <translation>10 avec EXIF ; sinon laissé à semsig localize</translation>
     </message>
@@ -12,8 +20,24 @@
         <translation>250, ou plus là où les requêtes sont rares</translation>
     </message>
     <message>
+        <source>A cell must see</source>
+        <translation>Une cellule doit voir</translation>
+    </message>
+    <message>
         <source>A unique cell can be identified at once, one of a thousand cannot. The raster holds, for each cell, the number of cells that look the same. `semsig identify` gives more detail, and takes longer.</source>
         <translation>Une cellule unique se reconnaît aussitôt, une parmi mille non. Le raster contient, pour chaque cellule, le nombre de cellules qui se ressemblent. `semsig identify` en dit plus, et prend plus de temps.</translation>
+    </message>
+    <message>
+        <source>Accuracy</source>
+        <translation>Exactitude</translation>
+    </message>
+    <message>
+        <source>Adapt the errors to the queries</source>
+        <translation>Adapter les erreurs aux requêtes</translation>
+    </message>
+    <message>
+        <source>Adapt the noise to all --queries first, which are views of one camera and detector.</source>
+        <translation>Adapter d’abord le modèle d’erreurs à toutes les --queries, qui sont des vues d’une caméra et d’un détecteur.</translation>
     </message>
     <message>
         <source>Address of a Dask scheduler.</source>
@@ -24,12 +48,28 @@
         <translation>Adresse d’un serveur à utiliser au lieu de celui du catalogue.</translation>
     </message>
     <message>
+        <source>Adds columns to the database, which `semsig info`, `map` and `export` show.</source>
+        <translation>Ajoute à la base des colonnes que `semsig info`, `map` et `export` montrent.</translation>
+    </message>
+    <message>
+        <source>Age of the map</source>
+        <translation>Âge de la carte</translation>
+    </message>
+    <message>
+        <source>Age of the map, from the survey of its objects to the query.</source>
+        <translation>Âge de la carte, du relevé de ses objets à la requête.</translation>
+    </message>
+    <message>
         <source>All layers</source>
         <translation>Toutes les couches</translation>
     </message>
     <message>
         <source>Also remove the street objects, which updates and refined places need.</source>
         <translation>Supprimer aussi les objets de rue, dont les mises à jour et les lieux affinés ont besoin.</translation>
+    </message>
+    <message>
+        <source>Also search between the centres of cells.</source>
+        <translation>Chercher aussi entre les centres des cellules.</translation>
     </message>
     <message>
         <source>Also the street objects</source>
@@ -76,6 +116,30 @@
         <translation>Zone à garder</translation>
     </message>
     <message>
+        <source>Assume that views are from the area of the database. Otherwise the chance that they are from elsewhere is 50 % before their objects are compared.</source>
+        <translation>Supposer que les vues viennent de la zone de la base. Sinon, la probabilité qu’elles viennent d’ailleurs est de 50 % avant que leurs objets soient comparés.</translation>
+    </message>
+    <message>
+        <source>Assume that views are from the centre of a cell, as in the paper, instead of from anywhere in it.</source>
+        <translation>Supposer que les vues sont prises du centre d’une cellule, comme dans l’article, et non de n’importe où en elle.</translation>
+    </message>
+    <message>
+        <source>Bearing of the middle of the photo.</source>
+        <translation>Azimut du milieu de la photo.</translation>
+    </message>
+    <message>
+        <source>Bearing of the photo</source>
+        <translation>Azimut de la photo</translation>
+    </message>
+    <message>
+        <source>Bearings</source>
+        <translation>Azimuts</translation>
+    </message>
+    <message>
+        <source>Benchmark on photographs</source>
+        <translation>Banc d’essai sur des photos</translation>
+    </message>
+    <message>
         <source>Box in degrees, a polygon file, or the name of a place.</source>
         <translation>Emprise en degrés, fichier de polygones, ou nom d’un lieu.</translation>
     </message>
@@ -116,6 +180,10 @@
         <translation>SCR de travail</translation>
     </message>
     <message>
+        <source>Calibrate the answers</source>
+        <translation>Étalonner les réponses</translation>
+    </message>
+    <message>
         <source>Camera data</source>
         <translation>Données de caméra</translation>
     </message>
@@ -134,6 +202,10 @@
     <message>
         <source>Candidates</source>
         <translation>Candidats</translation>
+    </message>
+    <message>
+        <source>Candidates that count</source>
+        <translation>Candidats qui comptent</translation>
     </message>
     <message>
         <source>Cannot tell: 90 % of the chance is in {cells} cells, and {chance} within {metres} m of the best place.</source>
@@ -188,6 +260,10 @@
         <translation>Probabilité</translation>
     </message>
     <message>
+        <source>Chance of the regions</source>
+        <translation>Probabilité des régions</translation>
+    </message>
+    <message>
         <source>Changes</source>
         <translation>Changements</translation>
     </message>
@@ -200,8 +276,16 @@
         <translation>Choisissez une base de signatures et ouvrez-la.</translation>
     </message>
     <message>
+        <source>Choose from which chance on a place is given as an answer.</source>
+        <translation>Choisit à partir de quelle probabilité un lieu est donné comme réponse.</translation>
+    </message>
+    <message>
         <source>Choose what you see, and click its direction in the dial. Click an object to remove it.</source>
         <translation>Choisissez ce que vous voyez, puis cliquez sa direction dans le cadran. Un clic sur un objet l’enlève.</translation>
+    </message>
+    <message>
+        <source>Class of false objects</source>
+        <translation>Classe des faux objets</translation>
     </message>
     <message>
         <source>Clear</source>
@@ -224,12 +308,40 @@
         <translation>Réunir les objets d’une classe au même lieu.</translation>
     </message>
     <message>
+        <source>Compare results</source>
+        <translation>Comparer des résultats</translation>
+    </message>
+    <message>
+        <source>Compare two results of queries from the same places.</source>
+        <translation>Compare deux résultats de requêtes des mêmes lieux.</translation>
+    </message>
+    <message>
         <source>Composes the view that is seen from a place of the map.</source>
         <translation>Compose la vue que l’on a d’un lieu de la carte.</translation>
     </message>
     <message>
         <source>Corner of a cell in metres, in the CRS of the objects.</source>
         <translation>Coin d’une cellule en mètres, dans le SCR des objets.</translation>
+    </message>
+    <message>
+        <source>Count the best of this many candidates (t).</source>
+        <translation>Compter le meilleur de ce nombre de candidats (t).</translation>
+    </message>
+    <message>
+        <source>Data set</source>
+        <translation>Jeu de données</translation>
+    </message>
+    <message>
+        <source>Data set: flatlandia or london-lights.</source>
+        <translation>Jeu de données : flatlandia ou london-lights.</translation>
+    </message>
+    <message>
+        <source>Database of another city</source>
+        <translation>Base d’une autre ville</translation>
+    </message>
+    <message>
+        <source>Database of another city: also count how many of its views are answered, which is wrong for all of them.</source>
+        <translation>Base d’une autre ville : compter aussi combien de ses vues reçoivent une réponse, ce qui est faux pour toutes.</translation>
     </message>
     <message>
         <source>Database to write.</source>
@@ -240,6 +352,14 @@
         <translation>Bases</translation>
     </message>
     <message>
+        <source>Day of the view</source>
+        <translation>Jour de la vue</translation>
+    </message>
+    <message>
+        <source>Day of the view, for magnetic north.</source>
+        <translation>Jour de la vue, pour le nord magnétique.</translation>
+    </message>
+    <message>
         <source>Default street width, where --streets has none.</source>
         <translation>Largeur de rue par défaut, là où --streets n’en a pas.</translation>
     </message>
@@ -248,8 +368,20 @@
         <translation>Par défaut : {}.</translation>
     </message>
     <message>
+        <source>Degrees clockwise from north, such as 10,80,200,310.</source>
+        <translation>Degrés à partir du nord dans le sens des aiguilles d’une montre, comme 10,80,200,310.</translation>
+    </message>
+    <message>
         <source>Demonstration</source>
         <translation>Démonstration</translation>
+    </message>
+    <message>
+        <source>Detections of known places</source>
+        <translation>Détections de lieux connus</translation>
+    </message>
+    <message>
+        <source>Detections of known places: a CSV or JSON lines file of views with x and y (metres) or cell_id (its centre).</source>
+        <translation>Détections de lieux connus : un fichier de vues en CSV ou JSON par lignes avec x et y (mètres) ou cell_id (son centre).</translation>
     </message>
     <message>
         <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary or Panoramax JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: photographs, or folders of them.</source>
@@ -262,6 +394,22 @@
     <message>
         <source>Direction of the camera, clockwise from north.</source>
         <translation>Direction de la caméra, à partir du nord dans le sens des aiguilles d’une montre.</translation>
+    </message>
+    <message>
+        <source>Distance to add around the cells of --out.</source>
+        <translation>Distance à ajouter autour des cellules de --out.</translation>
+    </message>
+    <message>
+        <source>Distort queries: none, light, medium or strong, or several, such as medium,compass:10,view:90.</source>
+        <translation>Déformer les requêtes : none (pas du tout), light (peu), medium (moyen) ou strong (beaucoup), ou plusieurs, comme medium,compass:10,view:90.</translation>
+    </message>
+    <message>
+        <source>Distortion</source>
+        <translation>Distorsion</translation>
+    </message>
+    <message>
+        <source>Do not sort the objects again after the bearing noise.</source>
+        <translation>Ne pas trier à nouveau les objets après les erreurs d’azimut.</translation>
     </message>
     <message>
         <source>Download OpenStreetMap for this canvas</source>
@@ -332,6 +480,34 @@
         <translation>Erreur du cap</translation>
     </message>
     <message>
+        <source>Errors of the detector</source>
+        <translation>Erreurs du détecteur</translation>
+    </message>
+    <message>
+        <source>Errors of the detector or person: light, medium, strong, generic (any of them), by-hand, photo, panorama, or a file written by `semsig learn`.</source>
+        <translation>Erreurs du détecteur ou de la personne : light (peu), medium (moyen), strong (beaucoup), generic (n’importe lequel), by-hand, photo, panorama, ou un fichier écrit par `semsig learn`.</translation>
+    </message>
+    <message>
+        <source>Errors of the detector: light, medium, strong, generic (any of them), by-hand (a person, who leaves some out), photo, panorama, or a file written by `semsig learn`.</source>
+        <translation>Erreurs du détecteur : light (peu), medium (moyen), strong (beaucoup), generic (n’importe lequel), by-hand (une personne, qui en omet), photo, panorama, ou un fichier écrit par `semsig learn`.</translation>
+    </message>
+    <message>
+        <source>Evaluate</source>
+        <translation>Évaluer</translation>
+    </message>
+    <message>
+        <source>Experiment</source>
+        <translation>Expérience</translation>
+    </message>
+    <message>
+        <source>Experiment, a .toml file.</source>
+        <translation>Expérience, un fichier .toml.</translation>
+    </message>
+    <message>
+        <source>Explain the best places</source>
+        <translation>Expliquer les meilleurs lieux</translation>
+    </message>
+    <message>
         <source>Explore a city</source>
         <translation>Explorer une ville</translation>
     </message>
@@ -348,8 +524,24 @@
         <translation>Champ de vision</translation>
     </message>
     <message>
+        <source>Field of view of a photo, around --look.</source>
+        <translation>Champ de vision d’une photo, autour de --look.</translation>
+    </message>
+    <message>
+        <source>Field of view of a query, in any direction.</source>
+        <translation>Champ de vision d’une requête, dans une direction quelconque.</translation>
+    </message>
+    <message>
         <source>File</source>
         <translation>Fichier</translation>
+    </message>
+    <message>
+        <source>File of many queries, as CSV or JSON lines, or - for JSON lines from standard input. Prints a line of JSON for each: an answer or an error.</source>
+        <translation>Fichier de nombreuses requêtes en CSV ou JSON par lignes, ou - pour du JSON par lignes sur l’entrée standard. Écrit pour chacune une ligne JSON : une réponse ou une erreur.</translation>
+    </message>
+    <message>
+        <source>File of queries</source>
+        <translation>Fichier de requêtes</translation>
     </message>
     <message>
         <source>File to write</source>
@@ -358,6 +550,10 @@
     <message>
         <source>File to write. Its suffix is the format: .gpkg (all layers, for QGIS), .parquet, .fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), .tif (one number per cell) or .json (STAC item).</source>
         <translation>Fichier à écrire. Son suffixe est le format : .gpkg (toutes les couches, pour QGIS), .parquet, .fgb, .geojson ou .csv (une couche), .pmtiles (cellules pour cartes web), .tif (un nombre par cellule) ou .json (élément STAC).</translation>
+    </message>
+    <message>
+        <source>File to write: search regions and candidates for QGIS (.gpkg) or in degrees (.geojson, .kml), only the regions (.parquet, .fgb, .csv), or the chance of every cell (.tif).</source>
+        <translation>Fichier à écrire : régions et candidats pour QGIS (.gpkg) ou en degrés (.geojson, .kml), seulement les régions (.parquet, .fgb, .csv), ou la probabilité de chaque cellule (.tif).</translation>
     </message>
     <message>
         <source>Files</source>
@@ -376,12 +572,36 @@
         <translation>Trouver le lieu</translation>
     </message>
     <message>
+        <source>Find where a view was seen from, or many views.</source>
+        <translation>Trouve d’où une vue, ou de nombreuses vues, ont été prises.</translation>
+    </message>
+    <message>
+        <source>Find where the views of a route were seen from.</source>
+        <translation>Trouve d’où les vues d’un trajet ont été prises.</translation>
+    </message>
+    <message>
         <source>First database</source>
         <translation>Première base</translation>
     </message>
     <message>
+        <source>First noise model</source>
+        <translation>Premier modèle d’erreurs</translation>
+    </message>
+    <message>
+        <source>First noise model for --unlabelled, a name or a file.</source>
+        <translation>Premier modèle d’erreurs pour --unlabelled, un nom ou un fichier.</translation>
+    </message>
+    <message>
         <source>Folder</source>
         <translation>Dossier</translation>
+    </message>
+    <message>
+        <source>Folder for the results</source>
+        <translation>Dossier des résultats</translation>
+    </message>
+    <message>
+        <source>Folder of an experiment or of an evaluation.</source>
+        <translation>Dossier d’une expérience ou d’une évaluation.</translation>
     </message>
     <message>
         <source>Folder of results</source>
@@ -394,6 +614,10 @@
     <message>
         <source>Folder of the cache.</source>
         <translation>Dossier du cache.</translation>
+    </message>
+    <message>
+        <source>Folder of the check</source>
+        <translation>Dossier de la vérification</translation>
     </message>
     <message>
         <source>Folder of the pictures</source>
@@ -412,8 +636,24 @@
         <translation>Dossier de wheels (laisser vide pour les télécharger)</translation>
     </message>
     <message>
+        <source>Folder to write a report of the check to.</source>
+        <translation>Dossier dans lequel écrire un rapport de la vérification.</translation>
+    </message>
+    <message>
+        <source>Folder to write the report and results to.</source>
+        <translation>Dossier dans lequel écrire le rapport et les résultats.</translation>
+    </message>
+    <message>
+        <source>Folder to write the results to.</source>
+        <translation>Dossier dans lequel écrire les résultats.</translation>
+    </message>
+    <message>
         <source>Folder to write to.</source>
         <translation>Dossier dans lequel écrire.</translation>
+    </message>
+    <message>
+        <source>Folder with the files of the data set.</source>
+        <translation>Dossier des fichiers du jeu de données.</translation>
     </message>
     <message>
         <source>Folder written by `semsig evaluate --out`, to add its queries.</source>
@@ -432,8 +672,20 @@
         <translation>Trouvé : le lieu est à moins de {metres} m avec une probabilité de {chance}.</translation>
     </message>
     <message>
+        <source>From the centres of cells</source>
+        <translation>Depuis le centre des cellules</translation>
+    </message>
+    <message>
         <source>From the true to the best place</source>
         <translation>Du vrai lieu au meilleur</translation>
+    </message>
+    <message>
+        <source>GPX track</source>
+        <translation>Trace GPX</translation>
+    </message>
+    <message>
+        <source>GPX track of the route, matched by the time of each view, or with one point for each view.</source>
+        <translation>Trace GPX du trajet, associée par l’heure de chaque vue, ou avec un point pour chaque vue.</translation>
     </message>
     <message>
         <source>GeoPackage</source>
@@ -468,6 +720,10 @@
         <translation>Comment une cellule est dessinée : polygone (polygon) ou point (point).</translation>
     </message>
     <message>
+        <source>How the class of a false object is drawn.</source>
+        <translation>Comment la classe d’un faux objet est tirée.</translation>
+    </message>
+    <message>
         <source>Identifiability</source>
         <translation>Identifiabilité</translation>
     </message>
@@ -496,6 +752,10 @@
         <translation>Garder les cellules de cette emprise en degrés, ou des polygones.</translation>
     </message>
     <message>
+        <source>Keep the order of the objects</source>
+        <translation>Garder l’ordre des objets</translation>
+    </message>
+    <message>
         <source>Largest distortion allowed for the CRS: degrees of bearings, percent of lengths.</source>
         <translation>Plus grande déformation admise pour le SCR : degrés des azimuts, pour cent des longueurs.</translation>
     </message>
@@ -504,12 +764,36 @@
         <translation>Plus grande déformation du SCR</translation>
     </message>
     <message>
+        <source>Largest error</source>
+        <translation>Plus grande erreur</translation>
+    </message>
+    <message>
+        <source>Largest error that counts as found.</source>
+        <translation>Plus grande erreur qui compte comme trouvée.</translation>
+    </message>
+    <message>
+        <source>Last known place</source>
+        <translation>Dernier lieu connu</translation>
+    </message>
+    <message>
+        <source>Last known place, in degrees or as X,Y,SIGMA in the CRS of the database, SIGMA in metres.</source>
+        <translation>Dernier lieu connu, en degrés ou sous la forme X,Y,SIGMA dans le SCR de la base, SIGMA en mètres.</translation>
+    </message>
+    <message>
         <source>Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; by default cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the default), identifiability, error, or field (share of the queries around that fail).</source>
         <translation>Couche à écrire : cells, objects, evaluation, evaluation_lines ou hexagons ; par défaut cells, dans un .gpkg toutes (plusieurs sont possibles). Dans un .tif : ambiguity (par défaut), identifiability, error ou field (part des requêtes alentour qui échouent).</translation>
     </message>
     <message>
         <source>Layers</source>
         <translation>Couches</translation>
+    </message>
+    <message>
+        <source>Learn detector errors</source>
+        <translation>Apprendre les erreurs d’un détecteur</translation>
+    </message>
+    <message>
+        <source>Learn the errors of a detector from detections of known places, or only from its views.</source>
+        <translation>Apprend les erreurs d’un détecteur à partir de détections de lieux connus, ou seulement de ses vues.</translation>
     </message>
     <message>
         <source>Leave out boxes with a lower score.</source>
@@ -526,6 +810,18 @@
     <message>
         <source>Load street objects</source>
         <translation>Charger les objets de rue</translation>
+    </message>
+    <message>
+        <source>Localization</source>
+        <translation>Localisation</translation>
+    </message>
+    <message>
+        <source>Localize</source>
+        <translation>Localiser</translation>
+    </message>
+    <message>
+        <source>Localize a route</source>
+        <translation>Localiser un trajet</translation>
     </message>
     <message>
         <source>Looking for Python...</source>
@@ -560,6 +856,18 @@
         <translation>Correspondances des étiquettes</translation>
     </message>
     <message>
+        <source>Margin of the regions</source>
+        <translation>Marge des régions</translation>
+    </message>
+    <message>
+        <source>Measure how often, and how closely, queries from known places are located.</source>
+        <translation>Mesure à quelle fréquence et avec quelle précision les requêtes de lieux connus sont localisées.</translation>
+    </message>
+    <message>
+        <source>Measure methods on real photographs with known places.</source>
+        <translation>Mesure des méthodes sur de vraies photos de lieux connus.</translation>
+    </message>
+    <message>
         <source>Merge objects of different layers within the catalogue's radii.</source>
         <translation>Fusionner les objets de couches différentes dans les rayons du catalogue.</translation>
     </message>
@@ -580,6 +888,38 @@
         <translation>Base fusionnée</translation>
     </message>
     <message>
+        <source>Method</source>
+        <translation>Méthode</translation>
+    </message>
+    <message>
+        <source>Method of the paper</source>
+        <translation>Méthode de l’article</translation>
+    </message>
+    <message>
+        <source>Methods</source>
+        <translation>Méthodes</translation>
+    </message>
+    <message>
+        <source>Methods with commas between them; --out has the worst failures of the last one.</source>
+        <translation>Méthodes séparées par des virgules ; --out contient les pires échecs de la dernière.</translation>
+    </message>
+    <message>
+        <source>Missed and false objects that the age of the map explains do not count.</source>
+        <translation>Les objets manqués ou faux que l’âge de la carte explique ne comptent pas.</translation>
+    </message>
+    <message>
+        <source>More databases</source>
+        <translation>Autres bases</translation>
+    </message>
+    <message>
+        <source>More databases before what was seen: the view may be from any of these cities.</source>
+        <translation>Autres bases avant ce qui a été vu : la vue peut venir de n’importe laquelle de ces villes.</translation>
+    </message>
+    <message>
+        <source>Most views</source>
+        <translation>Nombre maximal de vues</translation>
+    </message>
+    <message>
         <source>New street objects</source>
         <translation>Nouveaux objets de rue</translation>
     </message>
@@ -588,16 +928,56 @@
         <translation>Nouveaux objets de rue ; leurs couches remplacent des couches de la base.</translation>
     </message>
     <message>
+        <source>Noise model</source>
+        <translation>Modèle d’erreurs</translation>
+    </message>
+    <message>
+        <source>Noise model of the method learned, written by `semsig learn`.</source>
+        <translation>Modèle d’erreurs de la méthode learned, écrit par `semsig learn`.</translation>
+    </message>
+    <message>
+        <source>Noise model to write (.toml or .json), for --noise.</source>
+        <translation>Modèle d’erreurs à écrire (.toml ou .json), pour --noise.</translation>
+    </message>
+    <message>
+        <source>North from which bearings are measured; grid north is that of the database.</source>
+        <translation>Nord à partir duquel les azimuts sont mesurés ; le nord de la grille est celui de la base.</translation>
+    </message>
+    <message>
+        <source>North is</source>
+        <translation>Le nord est</translation>
+    </message>
+    <message>
         <source>North is unknown</source>
         <translation>Nord inconnu</translation>
+    </message>
+    <message>
+        <source>North of the bearings</source>
+        <translation>Nord des azimuts</translation>
+    </message>
+    <message>
+        <source>Number of candidates</source>
+        <translation>Nombre de candidats</translation>
+    </message>
+    <message>
+        <source>Number of candidates.</source>
+        <translation>Nombre de candidats.</translation>
     </message>
     <message>
         <source>Number of equal sectors in which the methods of the paper compare bearings.</source>
         <translation>Nombre de secteurs égaux dans lesquels les méthodes de l’article comparent les azimuts.</translation>
     </message>
     <message>
+        <source>Number of new queries to check the predictions with.</source>
+        <translation>Nombre de nouvelles requêtes avec lesquelles vérifier les prédictions.</translation>
+    </message>
+    <message>
         <source>Number of processes on this machine.</source>
         <translation>Nombre de processus sur cette machine.</translation>
+    </message>
+    <message>
+        <source>Number of processes, 0 to use this one only.</source>
+        <translation>Nombre de processus, 0 pour n’utiliser que celui-ci.</translation>
     </message>
     <message>
         <source>Number of queries</source>
@@ -606,6 +986,14 @@
     <message>
         <source>Number of queries to ask.</source>
         <translation>Nombre de requêtes à poser.</translation>
+    </message>
+    <message>
+        <source>Number of queries.</source>
+        <translation>Nombre de requêtes.</translation>
+    </message>
+    <message>
+        <source>Number of threads.</source>
+        <translation>Nombre de fils d’exécution.</translation>
     </message>
     <message>
         <source>Object detector</source>
@@ -672,6 +1060,22 @@
         <translation>Lieu</translation>
     </message>
     <message>
+        <source>Popularity of places</source>
+        <translation>Popularité des lieux</translation>
+    </message>
+    <message>
+        <source>Precision</source>
+        <translation>Précision</translation>
+    </message>
+    <message>
+        <source>Predict how well queries from each cell will be located.</source>
+        <translation>Prédit avec quelle précision les requêtes de chaque cellule seront localisées.</translation>
+    </message>
+    <message>
+        <source>Predict the accuracy</source>
+        <translation>Prédire l’exactitude</translation>
+    </message>
+    <message>
         <source>Print the properties of a database next to those in the paper.</source>
         <translation>Montre les propriétés d’une base à côté de celles de l’article.</translation>
     </message>
@@ -704,6 +1108,10 @@
         <translation>Requêtes</translation>
     </message>
     <message>
+        <source>Queries to check the predictions</source>
+        <translation>Requêtes pour vérifier les prédictions</translation>
+    </message>
+    <message>
         <source>Radius of smoothing</source>
         <translation>Rayon de lissage</translation>
     </message>
@@ -714,6 +1122,30 @@
     <message>
         <source>Rank</source>
         <translation>Rang</translation>
+    </message>
+    <message>
+        <source>Rank as the paper does: --method edit+edit:5%.</source>
+        <translation>Classer comme l’article : --method edit+edit:5%.</translation>
+    </message>
+    <message>
+        <source>Rank by likelihood, or by distance as TYPES+ANGLES (edit, histogram, jaccard), types:edit or angles:edit; add :5% for two stages, :alpha=0.7, :raw or :weights=INSERT/DELETE/SUBSTITUTE.</source>
+        <translation>Classer par vraisemblance (likelihood), ou par distance sous la forme TYPES+ANGLES (edit, histogram, jaccard), types:edit ou angles:edit ; ajoutez :5% pour deux étapes, :alpha=0.7, :raw ou :weights=INSERT/DELETE/SUBSTITUTE.</translation>
+    </message>
+    <message>
+        <source>Raster of how likely each place is beforehand, such as population.</source>
+        <translation>Raster de la probabilité de chaque lieu a priori, comme la population.</translation>
+    </message>
+    <message>
+        <source>Raster to write (.tif).</source>
+        <translation>Raster à écrire (.tif).</translation>
+    </message>
+    <message>
+        <source>Rate at which the city changes, for --map-age: output of `semsig update --years N --json`, or a .toml file with the same keys.</source>
+        <translation>Taux auquel la ville change, pour --map-age : sortie de `semsig update --years N --json`, ou un fichier .toml avec les mêmes clés.</translation>
+    </message>
+    <message>
+        <source>Rate of change</source>
+        <translation>Taux de changement</translation>
     </message>
     <message>
         <source>Read files of open data into street objects.</source>
@@ -748,6 +1180,18 @@
         <translation>Supprime les fichiers restés à côté d’une base.</translation>
     </message>
     <message>
+        <source>Repeat the paper's experiments</source>
+        <translation>Répéter les expériences de l’article</translation>
+    </message>
+    <message>
+        <source>Repeat the paper's experiments and compare the results.</source>
+        <translation>Répète les expériences de l’article et compare les résultats.</translation>
+    </message>
+    <message>
+        <source>Report page</source>
+        <translation>Page de rapport</translation>
+    </message>
+    <message>
         <source>Resolution of hexagons</source>
         <translation>Résolution des hexagones</translation>
     </message>
@@ -760,20 +1204,76 @@
         <translation>Résultats</translation>
     </message>
     <message>
+        <source>Results to write (.json).</source>
+        <translation>Résultats à écrire (.json).</translation>
+    </message>
+    <message>
         <source>Roll</source>
         <translation>Roulis</translation>
+    </message>
+    <message>
+        <source>Rough distances</source>
+        <translation>Distances approximatives</translation>
+    </message>
+    <message>
+        <source>Rough distances: metres, near, middle, far or ?, such as 12,?,near.</source>
+        <translation>Distances approximatives : mètres, near (proche), middle (moyenne), far (lointaine) ou ?, comme 12,?,near.</translation>
+    </message>
+    <message>
+        <source>Rule for answers</source>
+        <translation>Règle des réponses</translation>
+    </message>
+    <message>
+        <source>Rule for when to answer, written by `semsig calibrate`.</source>
+        <translation>Règle qui décide quand répondre, écrite par `semsig calibrate`.</translation>
+    </message>
+    <message>
+        <source>Rule to write (.json), for --rule.</source>
+        <translation>Règle à écrire (.json), pour --rule.</translation>
+    </message>
+    <message>
+        <source>Run an experiment</source>
+        <translation>Exécuter une expérience</translation>
     </message>
     <message>
         <source>Run every step on a small made-up city, offline.</source>
         <translation>Exécute chaque étape sur une petite ville inventée, sans réseau.</translation>
     </message>
     <message>
+        <source>Run the evaluations of an experiment, or resume them.</source>
+        <translation>Exécute les évaluations d’une expérience, ou les reprend.</translation>
+    </message>
+    <message>
+        <source>Run the paper's 10,000 queries, or 300 in a small city.</source>
+        <translation>Exécuter les 10 000 requêtes de l’article, ou 300 dans une petite ville.</translation>
+    </message>
+    <message>
         <source>Scheduler</source>
         <translation>Ordonnanceur</translation>
     </message>
     <message>
+        <source>Search between the centres of cells</source>
+        <translation>Chercher entre les centres des cellules</translation>
+    </message>
+    <message>
+        <source>Search only cells that see this: M (one or more), 2B (two or more), B=0 (none), ?&lt;=10 (at most ten objects).</source>
+        <translation>Ne chercher que dans les cellules qui voient ceci : M (un ou plus), 2B (deux ou plus), B=0 (aucun), ?&lt;=10 (dix objets au plus).</translation>
+    </message>
+    <message>
+        <source>Search only in this box in degrees, or in the polygons of a file.</source>
+        <translation>Ne chercher que dans cette emprise en degrés, ou dans les polygones d’un fichier.</translation>
+    </message>
+    <message>
         <source>Second database</source>
         <translation>Deuxième base</translation>
+    </message>
+    <message>
+        <source>Sectors</source>
+        <translation>Secteurs</translation>
+    </message>
+    <message>
+        <source>Sectors that were looked at, if not the full turn, such as 20-90,180-250.</source>
+        <translation>Secteurs qui ont été regardés, sinon le tour complet, comme 20-90,180-250.</translation>
     </message>
     <message>
         <source>Seed</source>
@@ -808,8 +1308,16 @@
         <translation>Forme d’une cellule</translation>
     </message>
     <message>
+        <source>Share of the answers that should be right.</source>
+        <translation>Part des réponses qui doivent être justes.</translation>
+    </message>
+    <message>
         <source>Show how many cells see the same types in the same order.</source>
         <translation>Montre combien de cellules voient les mêmes types dans le même ordre.</translation>
+    </message>
+    <message>
+        <source>Show which objects of the view match which street objects, which were missed and which look false.</source>
+        <translation>Montrer quels objets de la vue correspondent à quels objets de rue, lesquels ont été manqués et lesquels semblent faux.</translation>
     </message>
     <message>
         <source>Shows what is seen from a cell, and the most similar cells.</source>
@@ -868,6 +1376,10 @@
         <translation>Taille des images là où elle est inconnue, comme 1920x1080.</translation>
     </message>
     <message>
+        <source>Size of the experiments</source>
+        <translation>Taille des expériences</translation>
+    </message>
+    <message>
         <source>Size of the pictures</source>
         <translation>Taille des images</translation>
     </message>
@@ -904,12 +1416,32 @@
         <translation>Objets de rue écrits par `semsig load`.</translation>
     </message>
     <message>
+        <source>Street objects: a file written by `semsig load`, or an object store.</source>
+        <translation>Objets de rue : un fichier écrit par `semsig load`, ou un magasin d’objets.</translation>
+    </message>
+    <message>
         <source>Street width</source>
         <translation>Largeur de rue</translation>
     </message>
     <message>
         <source>Streets</source>
         <translation>Rues</translation>
+    </message>
+    <message>
+        <source>Suggest what to look for</source>
+        <translation>Proposer quoi regarder</translation>
+    </message>
+    <message>
+        <source>Suggest what to look for next, most useful first.</source>
+        <translation>Propose quoi regarder ensuite, le plus utile d’abord.</translation>
+    </message>
+    <message>
+        <source>Surely from this area</source>
+        <translation>Sûrement de cette zone</translation>
+    </message>
+    <message>
+        <source>Symbols clockwise from north, such as DDBL; ? where one is unknown.</source>
+        <translation>Symboles à partir du nord dans le sens des aiguilles d’une montre, comme DDBL ; ? pour un symbole inconnu.</translation>
     </message>
     <message>
         <source>The city is divided into square cells. For each it is stored which street objects are seen from its centre, clockwise from north: its signature. Cells that see nothing are left out. A folder with the street objects, ready to be searched, is written next to the database.</source>
@@ -940,6 +1472,10 @@
         <translation>Le moteur a été supprimé.</translation>
     </message>
     <message>
+        <source>The layers, in a GeoPackage.</source>
+        <translation>Les couches, dans un GeoPackage.</translation>
+    </message>
+    <message>
         <source>The places that a view from here may be confused with, by chance:</source>
         <translation>Les lieux avec lesquels une vue d’ici peut être confondue, par probabilité :</translation>
     </message>
@@ -968,6 +1504,10 @@
         <translation>Voici ce que l’on voit de là ; modifiez-le ou trouvez le lieu.</translation>
     </message>
     <message>
+        <source>Threads</source>
+        <translation>Fils d’exécution</translation>
+    </message>
+    <message>
         <source>Tile size</source>
         <translation>Taille des tuiles</translation>
     </message>
@@ -988,8 +1528,16 @@
         <translation>Titre</translation>
     </message>
     <message>
+        <source>Total chance of the regions of --out.</source>
+        <translation>Probabilité totale des régions de --out.</translation>
+    </message>
+    <message>
         <source>Turn the boxes of an object detector into views for semsig localize.</source>
         <translation>Transforme les cadres d’un détecteur d’objets en vues pour semsig localize.</translation>
+    </message>
+    <message>
+        <source>Types</source>
+        <translation>Types</translation>
     </message>
     <message>
         <source>Update signature database</source>
@@ -998,6 +1546,10 @@
     <message>
         <source>Updated database</source>
         <translation>Base mise à jour</translation>
+    </message>
+    <message>
+        <source>Use at most this many views a set.</source>
+        <translation>Utiliser au plus ce nombre de vues par ensemble.</translation>
     </message>
     <message>
         <source>Use the cache only.</source>
@@ -1024,6 +1576,18 @@
         <translation>Vues à partir de détections</translation>
     </message>
     <message>
+        <source>Views in their order: a CSV or JSON lines file, or - for JSON lines from standard input. Each after the first has the step from the previous view, dx,dy or distance,bearing (metres, degrees), and its sigma; or use --track.</source>
+        <translation>Vues dans leur ordre : un fichier CSV ou JSON par lignes, ou - pour du JSON par lignes sur l’entrée standard. Chacune après la première a le pas depuis la vue précédente, dx,dy ou distance,bearing (mètres, degrés), et son sigma ; ou utilisez --track.</translation>
+    </message>
+    <message>
+        <source>Views of one camera and detector at unknown places, instead of --samples: a CSV or JSON lines file, as of semsig localize --queries.</source>
+        <translation>Vues d’une caméra et d’un détecteur de lieux inconnus, au lieu de --samples : un fichier CSV ou JSON par lignes, comme pour semsig localize --queries.</translation>
+    </message>
+    <message>
+        <source>Views of unknown places</source>
+        <translation>Vues de lieux inconnus</translation>
+    </message>
+    <message>
         <source>Views to write (.jsonl), for --queries.</source>
         <translation>Vues à écrire (.jsonl), pour --queries.</translation>
     </message>
@@ -1036,8 +1600,28 @@
         <translation>Portée de visibilité des classes pour lesquelles le catalogue n’en donne pas.</translation>
     </message>
     <message>
+        <source>Visibility range.</source>
+        <translation>Portée de visibilité.</translation>
+    </message>
+    <message>
+        <source>What was seen</source>
+        <translation>Ce qui a été vu</translation>
+    </message>
+    <message>
+        <source>What was seen, clockwise from north: symbols such as DDBL, or words, as 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'.</source>
+        <translation>Ce qui a été vu, à partir du nord dans le sens des aiguilles d’une montre : des symboles comme DDBL, ou des mots (en anglais), comme 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'.</translation>
+    </message>
+    <message>
+        <source>Whether north is known: known, unknown, or its standard deviation in degrees, 0.001 to 360.</source>
+        <translation>Si le nord est connu : known (connu), unknown (inconnu), ou son écart type en degrés, de 0.001 à 360.</translation>
+    </message>
+    <message>
         <source>Without a network</source>
         <translation>Sans réseau</translation>
+    </message>
+    <message>
+        <source>Write a page with curves, a map and the worst failures (.html).</source>
+        <translation>Écrire une page avec des courbes, une carte et les pires échecs (.html).</translation>
     </message>
     <message>
         <source>Write a title on the map, such as the city and the date of its data.</source>
@@ -1052,8 +1636,20 @@
         <translation>Années entre les anciens objets et les nouveaux, pour le rapport de --json.</translation>
     </message>
     <message>
+        <source>a made-up Paris</source>
+        <translation>un Paris inventé</translation>
+    </message>
+    <message>
         <source>all built-in maps</source>
         <translation>toutes celles qui sont intégrées</translation>
+    </message>
+    <message>
+        <source>all processors</source>
+        <translation>tous les processeurs</translation>
+    </message>
+    <message>
+        <source>all processors, 0 for --size small</source>
+        <translation>tous les processeurs, 0 pour --size small</translation>
     </message>
     <message>
         <source>as a polygon, in CSV as a point</source>
@@ -1062,6 +1658,10 @@
     <message>
         <source>as many cells as Paris</source>
         <translation>autant de cellules que Paris</translation>
+    </message>
+    <message>
+        <source>by-hand for a view in words, photo for a view of sectors, panorama for a full turn with scores, otherwise generic</source>
+        <translation>by-hand pour une vue en mots, photo pour une vue par secteurs, panorama pour un tour complet avec des scores, sinon generic</translation>
     </message>
     <message>
         <source>downloaded</source>
@@ -1084,12 +1684,28 @@
         <translation>d’EXIF ; 360 pour un panorama</translation>
     </message>
     <message>
+        <source>from a chance of 0.9</source>
+        <translation>à partir d’une probabilité de 0,9</translation>
+    </message>
+    <message>
         <source>from the database</source>
         <translation>de la base</translation>
     </message>
     <message>
+        <source>full turn</source>
+        <translation>tour complet</translation>
+    </message>
+    <message>
         <source>in place</source>
         <translation>sur place</translation>
+    </message>
+    <message>
+        <source>learn it</source>
+        <translation>il est appris</translation>
+    </message>
+    <message>
+        <source>likelihood</source>
+        <translation>likelihood</translation>
     </message>
     <message>
         <source>looked for</source>
@@ -1124,6 +1740,14 @@
         <translation>celui de semsig</translation>
     </message>
     <message>
+        <source>that of --size</source>
+        <translation>celui de --size</translation>
+    </message>
+    <message>
+        <source>that of Monaco in OpenStreetMap</source>
+        <translation>celui de Monaco dans OpenStreetMap</translation>
+    </message>
+    <message>
         <source>the catalogue's or the UTM zone</source>
         <translation>celui du catalogue, ou la zone UTM</translation>
     </message>
@@ -1140,8 +1764,24 @@
         <translation>le nom du fichier de la base</translation>
     </message>
     <message>
+        <source>the store of the database</source>
+        <translation>le magasin de la base</translation>
+    </message>
+    <message>
+        <source>today</source>
+        <translation>aujourd’hui</translation>
+    </message>
+    <message>
         <source>under 1 %</source>
         <translation>moins de 1 %</translation>
+    </message>
+    <message>
+        <source>uniform</source>
+        <translation>uniform (uniforme)</translation>
+    </message>
+    <message>
+        <source>where there are street objects and bearings</source>
+        <translation>là où il y a des objets de rue et des azimuts</translation>
     </message>
     <message>
         <source>years</source>
@@ -1150,6 +1790,10 @@
     <message>
         <source>{name}: {cells} cells. Click a cell, or compose what you see.</source>
         <translation>{name} : {cells} cellules. Cliquez une cellule, ou composez ce que vous voyez.</translation>
+    </message>
+    <message>
+        <source>{title}: {part}</source>
+        <translation>{title} : {part}</translation>
     </message>
     <message>
         <source>°</source>

@@ -149,8 +149,9 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
             parameter = new_file(kind, name, tr(extra.title), [extra.suffix], created=False)
             optional = QgsProcessingParameterDefinition.Flag.FlagOptional
             parameter.setFlags(parameter.flags() | optional)
-            options = self.commands[extra.command]["request"]["properties"]
-            parameter.setHelp(self._shown(options["out"]["description"]))
+            if kind != "layers":
+                options = self.commands[extra.command]["request"]["properties"]
+                parameter.setHelp(self._shown(options["out"]["description"]))
             self.addParameter(parameter)
 
     def processAlgorithm(  # noqa: N802

@@ -83,15 +83,17 @@ def make_parameters(
     for parameter, kind in kinds.items():
         title = titled(option)
         if len(kinds) > 1 and kind in KINDS_OF_ONE:
-            title = f"{title}: {tr(KINDS_OF_ONE[kind])}"
+            title = tr("{title}: {part}").format(title=title, part=tr(KINDS_OF_ONE[kind]))
         definition = _definition(kind, parameter, title, option, required=required)
-        flags, flag = definition.flags(), QgsProcessingParameterDefinition.Flag
+        flags = definition.flags()
         if not required or len(kinds) > 1:
-            flags |= flag.FlagOptional
+            flags |= QgsProcessingParameterDefinition.Flag.FlagOptional
         if option.get("x-advanced"):
-            flags |= flag.FlagAdvanced
+            flags |= QgsProcessingParameterDefinition.Flag.FlagAdvanced
         definition.setFlags(flags)
-        definition.setHelp(text)
+        if kind != "layers":
+            definition.setHelp(text)
+        text = ""  # it is that of all parameters of the option
         yield definition
 
 
@@ -108,15 +110,14 @@ def _definition(kind: str, name: str, title: str, option: dict[str, Any], *, req
         parameter = QgsProcessingParameterEnum(name, title, choices or YES_OR_NO, many, default)
         parameter.setUsesStaticStrings(True)
         return parameter
-    behavior = QgsProcessingParameterFile.Behavior
     if kind == "lines":
         return QgsProcessingParameterString(name, title, "\n".join(default or []), multiLine=True)
     make, values = {
         "crs": (QgsProcessingParameterCrs, default),
         "extent": (QgsProcessingParameterExtent, _canvas(option)),
-        "file": (QgsProcessingParameterFile, behavior.File),
+        "file": (QgsProcessingParameterFile, QgsProcessingParameterFile.Behavior.File),
         "files": (QgsProcessingParameterMultipleLayers, QgsProcessing.SourceType.TypeFile),
-        "folder": (QgsProcessingParameterFile, behavior.Folder),
+        "folder": (QgsProcessingParameterFile, QgsProcessingParameterFile.Behavior.Folder),
         "polygons": (QgsProcessingParameterVectorLayer, POLYGONS),
         "switch": (QgsProcessingParameterBoolean, default),
         "text": (QgsProcessingParameterString, default),
@@ -127,11 +128,11 @@ def _definition(kind: str, name: str, title: str, option: dict[str, Any], *, req
 def _number(kind: str, name: str, title: str, schema: dict[str, Any], default: float | None) -> Any:  # noqa: ANN401
     """Return the parameter for a number."""
     low, high = schema.get("minimum", -LARGEST), schema.get("maximum", LARGEST)
-    types = QgsProcessingParameterNumber.Type
+    whole = QgsProcessingParameterNumber.Type.Integer
     parameter = QgsProcessingParameterNumber(
         name,
         title,
-        types.Integer if kind == "integer" else types.Double,
+        whole if kind == "integer" else QgsProcessingParameterNumber.Type.Double,
         default,
         False,  # noqa: FBT003 - as QGIS calls it: not optional
         low,
@@ -153,7 +154,9 @@ def new_file(
     excepted.
     """
     if kind == "layers":
-        return QgsProcessingParameterVectorDestination(name, title)
+        parameter = QgsProcessingParameterVectorDestination(name, title)
+        parameter.setHelp(tr("The layers, in a GeoPackage."))
+        return parameter
     if kind == "raster":
         return QgsProcessingParameterRasterDestination(name, title)
     if kind == "new folder":

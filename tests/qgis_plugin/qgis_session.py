@@ -234,7 +234,7 @@ def refuse() -> list[list[str]]:
         ("build", {"OBJECTS": objects, "OUT": later, "CELLS": str(PLACE / "b.shp")}),
         ("identify", {"CELLS": shown(), "MAP": str(PLACE / "map.json")}),
         ("evaluate", {"OUT": TEMPORARY, "LAYERS": str(PLACE / "lamps.geojson" / "b.gpkg")}),
-        ("fetch", {"NAME": "openstreetmap", "OUT": str(PLACE / "nowhere.parquet")}),
+        ("fetch", {"CATALOG": "openstreetmap", "OUT": str(PLACE / "nowhere.parquet")}),
     ):
         database: dict[str, Any] = {} if name in {"build", "fetch"} else {"DATABASE": DATABASE}
         errors.append(run(name, **database, **parameters).errors)

@@ -110,20 +110,20 @@ def schema_texts(command: dict[str, Any]) -> set[str]:
 
 def code_texts(path: Path) -> set[str]:
     """Return the texts in the code of the plugin, and the titles of layers."""
-    texts: set[str] = set()
+    values: list[ast.expr | None] = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Dict):  # options of a tool
+            keys = [key.value if isinstance(key, ast.Constant) else None for key in node.keys]
+            pairs = zip(keys, node.values, strict=True)
+            values += [value for key, value in pairs if key == "description"]
         if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
             continue
-        name, values = node.func.id, [*node.args[:1]] if node.args else []
-        keywords = [key for key in node.keywords if key.arg in {"title", "help"}]
-        if name.endswith(("layer", "Layer", "Tool")):
-            values = [key.value for key in keywords]
-        elif name not in {"tr", "Extra"}:
-            continue
-        for value in values:
-            if isinstance(value, ast.Constant) and isinstance(value.value, str):
-                texts |= paragraphs(value.value)
-    return texts
+        if node.func.id in {"tr", "Extra"}:
+            values += node.args[:1]
+        elif node.func.id.endswith(("layer", "Layer", "Tool")):
+            values += [key.value for key in node.keywords if key.arg in {"title", "help"}]
+    texts = [value.value for value in values if isinstance(value, ast.Constant)]
+    return {part for text in texts if isinstance(text, str) for part in paragraphs(text)}
 
 
 def shown_texts() -> set[str]:
