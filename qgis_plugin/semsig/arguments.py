@@ -73,15 +73,14 @@ def parameter_kinds(  # noqa: PLR0911 - a kind each
             f"{name}_EXTENT": "extent",
             **({f"{name}_TEXT": "text"} if others - {BOX, "CANVAS", "FILE"} else {}),
         }
-    is_path = metavar in {"FILE", "FOLDER"}
-    if not option.get("x-reads") and not is_path:
-        many_kind = "choices" if option.get("x-suggestions") else "lines"
-        return {name: many_kind if many else "text"}
-    if option.get("x-suggestions"):
+    if option.get("x-reads") and option.get("x-suggestions"):
         return {name: "choices" if many else "choice", f"{name}_FILE": "file"}
+    if metavar in {"FILE", "FILE|-"}:
+        return {name: "files" if many else "file"}
     if metavar == "FOLDER":
         return {name: "folder"}
-    return {name: "files" if many else "file"}
+    many_kind = "choices" if option.get("x-suggestions") else "lines"
+    return {name: many_kind if many else "text"}
 
 
 def option_words(option: dict[str, Any], value: Any) -> list[str]:  # noqa: ANN401 - any value
