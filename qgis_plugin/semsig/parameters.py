@@ -86,7 +86,7 @@ def make_parameters(
             title = tr("{title}: {part}").format(title=title, part=tr(KINDS_OF_ONE[kind]))
         definition = _definition(kind, parameter, title, option, required=required)
         flags = definition.flags()
-        if not required or len(kinds) > 1:
+        if len(kinds) > 1 or (not required and option["default"] is None):
             flags |= QgsProcessingParameterDefinition.Flag.FlagOptional
         if option.get("x-advanced"):
             flags |= QgsProcessingParameterDefinition.Flag.FlagAdvanced
