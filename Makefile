@@ -124,8 +124,8 @@ walks: $(DEV) ## the functions and modules that a row of trees and a query cross
 pictures: $(DEV) ## screenshots of every kind of map, light and dark, desktop and phone
 	$(BIN)/python -m benchmarks.pictures
 
-plugin: ## the QGIS plugin, into dist/: a zip file to install
-	$(PYTHON) qgis_plugin/package.py dist $(if $(SEMSIG_EMAIL),--email $(SEMSIG_EMAIL))
+plugin: $(RELEASE) ## the QGIS plugin, into dist/: a zip file to install
+	$(BIN)/python qgis_plugin/package.py dist $(if $(SEMSIG_EMAIL),--email $(SEMSIG_EMAIL))
 
 dist: $(RELEASE) ## a release, into dist/: built twice, checked, installed offline, with its hashes
 	.ci/dist $(BIN)
