@@ -172,7 +172,7 @@ def _canvas(option: dict[str, Any]) -> str | None:
 
     There may be no canvas.
     """
-    if utils.iface is None or "CANVAS" not in option["x-metavar"]:
+    if utils.iface is None or "CANVAS" not in option.get("x-metavar", ""):
         return None
     canvas = utils.iface.mapCanvas()
     box, crs = canvas.extent(), canvas.mapSettings().destinationCrs().authid()
