@@ -548,8 +548,8 @@
         <translation>Datei, die geschrieben wird</translation>
     </message>
     <message>
-        <source>File to write. Its suffix is the format: .gpkg (all layers, for QGIS), .parquet, .fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), .tif (one number per cell) or .json (STAC item).</source>
-        <translation>Datei, die geschrieben wird. Ihre Endung ist das Format: .gpkg (alle Layer, für QGIS), .parquet, .fgb, .geojson oder .csv (ein Layer), .pmtiles (Zellen für Webkarten), .tif (eine Zahl je Zelle) oder .json (STAC-Eintrag).</translation>
+        <source>File to write. Its suffix is the format: .csv, .fgb, .geojson, .gpkg, .parquet, .pmtiles, .tif or .json. A .gpkg (for QGIS) has all layers, .pmtiles (for web maps) the cells, .tif a raster of the cells, .json a description (STAC item), and other formats one layer.</source>
+        <translation>Datei, die geschrieben wird. Ihre Endung ist das Format: .csv, .fgb, .geojson, .gpkg, .parquet, .pmtiles, .tif oder .json. Ein .gpkg (für QGIS) enthält alle Layer, .pmtiles (für Webkarten) die Zellen, .tif ein Raster der Zellen, .json eine Beschreibung (STAC-Eintrag), andere Formate einen Layer.</translation>
     </message>
     <message>
         <source>File to write: search regions and candidates for QGIS (.gpkg) or in degrees (.geojson, .kml), only the regions (.parquet, .fgb, .csv), or the chance of every cell (.tif).</source>
@@ -780,8 +780,8 @@
         <translation>Letzter bekannter Ort, in Grad oder als X,Y,SIGMA im KBS der Datenbank, SIGMA in Metern.</translation>
     </message>
     <message>
-        <source>Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; by default cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the default), identifiability, error, or field (share of the queries around that fail).</source>
-        <translation>Layer, der geschrieben wird: cells, objects, evaluation, evaluation_lines oder hexagons; ohne Angabe cells, in einem .gpkg alle (mehrere sind möglich). In einem .tif: ambiguity (ohne Angabe), identifiability, error oder field (Anteil der Anfragen im Umkreis, die scheitern).</translation>
+        <source>Layer to write, by default cells, in a .gpkg all: cells, evaluation, evaluation_lines, hexagons, objects (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
+        <translation>Layer, der geschrieben wird, ohne Angabe cells, in einem .gpkg alle: cells, evaluation, evaluation_lines, hexagons, objects (mehrere sind möglich). In einem .tif, ohne Angabe ambiguity: ambiguity, error, field, identifiability.</translation>
     </message>
     <message>
         <source>Layers</source>
@@ -1388,6 +1388,10 @@
         <translation>Einige Quadratkilometer brauchen Sekunden bis Minuten. Was schon heruntergeladen wurde, kommt aus dem Zwischenspeicher. Der Server wird eingestellt unter Einstellungen &gt; Optionen &gt; Verarbeitung &gt; Anbieter &gt; Semantische Signaturen.</translation>
     </message>
     <message>
+        <source>Squares of cells</source>
+        <translation>Quadrate der Zellen</translation>
+    </message>
+    <message>
         <source>Standard deviation of the heading in degrees, or unknown.</source>
         <translation>Standardabweichung der Blickrichtung in Grad, oder unknown (unbekannt).</translation>
     </message>
@@ -1470,6 +1474,10 @@
     <message>
         <source>The engine was removed.</source>
         <translation>Die Engine wurde entfernt.</translation>
+    </message>
+    <message>
+        <source>The extent to download; by default the extent of the canvas.</source>
+        <translation>Der Ausschnitt, der heruntergeladen wird; ohne Angabe der Ausschnitt der Karte.</translation>
     </message>
     <message>
         <source>The layers, in a GeoPackage.</source>

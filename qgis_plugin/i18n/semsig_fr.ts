@@ -548,8 +548,8 @@
         <translation>Fichier à écrire</translation>
     </message>
     <message>
-        <source>File to write. Its suffix is the format: .gpkg (all layers, for QGIS), .parquet, .fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), .tif (one number per cell) or .json (STAC item).</source>
-        <translation>Fichier à écrire. Son suffixe est le format : .gpkg (toutes les couches, pour QGIS), .parquet, .fgb, .geojson ou .csv (une couche), .pmtiles (cellules pour cartes web), .tif (un nombre par cellule) ou .json (élément STAC).</translation>
+        <source>File to write. Its suffix is the format: .csv, .fgb, .geojson, .gpkg, .parquet, .pmtiles, .tif or .json. A .gpkg (for QGIS) has all layers, .pmtiles (for web maps) the cells, .tif a raster of the cells, .json a description (STAC item), and other formats one layer.</source>
+        <translation>Fichier à écrire. Son suffixe est le format : .csv, .fgb, .geojson, .gpkg, .parquet, .pmtiles, .tif ou .json. Un .gpkg (pour QGIS) contient toutes les couches, .pmtiles (pour cartes web) les cellules, .tif un raster des cellules, .json une description (élément STAC), les autres formats une couche.</translation>
     </message>
     <message>
         <source>File to write: search regions and candidates for QGIS (.gpkg) or in degrees (.geojson, .kml), only the regions (.parquet, .fgb, .csv), or the chance of every cell (.tif).</source>
@@ -780,8 +780,8 @@
         <translation>Dernier lieu connu, en degrés ou sous la forme X,Y,SIGMA dans le SCR de la base, SIGMA en mètres.</translation>
     </message>
     <message>
-        <source>Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; by default cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the default), identifiability, error, or field (share of the queries around that fail).</source>
-        <translation>Couche à écrire : cells, objects, evaluation, evaluation_lines ou hexagons ; par défaut cells, dans un .gpkg toutes (plusieurs sont possibles). Dans un .tif : ambiguity (par défaut), identifiability, error ou field (part des requêtes alentour qui échouent).</translation>
+        <source>Layer to write, by default cells, in a .gpkg all: cells, evaluation, evaluation_lines, hexagons, objects (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
+        <translation>Couche à écrire, par défaut cells, dans un .gpkg toutes : cells, evaluation, evaluation_lines, hexagons, objects (plusieurs sont possibles). Dans un .tif, par défaut ambiguity : ambiguity, error, field, identifiability.</translation>
     </message>
     <message>
         <source>Layers</source>
@@ -1388,6 +1388,10 @@
         <translation>Quelques kilomètres carrés prennent des secondes ou des minutes. Ce qui a déjà été téléchargé vient du cache. Le serveur se règle dans Préférences &gt; Options &gt; Traitement &gt; Fournisseurs &gt; Signatures sémantiques.</translation>
     </message>
     <message>
+        <source>Squares of cells</source>
+        <translation>Carrés des cellules</translation>
+    </message>
+    <message>
         <source>Standard deviation of the heading in degrees, or unknown.</source>
         <translation>Écart type du cap en degrés, ou unknown (inconnu).</translation>
     </message>
@@ -1470,6 +1474,10 @@
     <message>
         <source>The engine was removed.</source>
         <translation>Le moteur a été supprimé.</translation>
+    </message>
+    <message>
+        <source>The extent to download; by default the extent of the canvas.</source>
+        <translation>L’emprise à télécharger ; par défaut l’emprise de la carte.</translation>
     </message>
     <message>
         <source>The layers, in a GeoPackage.</source>

@@ -127,7 +127,12 @@ The server is a setting: Settings > Options > Processing > Providers > Semantic 
 """,
         only=("area", "out", "buildings", "streets"),
         fixed={"catalog": "openstreetmap"},
-        changed={"area": {"x-metavar": "WEST,SOUTH,EAST,NORTH|CANVAS"}},
+        changed={
+            "area": {
+                "x-metavar": "WEST,SOUTH,EAST,NORTH|CANVAS",
+                "description": "The extent to download; by default the extent of the canvas.",
+            }
+        },
     ),
 )
 

@@ -9,18 +9,23 @@ import json
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+from qgis import utils
 from qgis.core import (
     QgsApplication,
+    QgsCoordinateReferenceSystem,
     QgsProcessingAlgRunnerTask,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingOutputLayerDefinition,
     QgsProcessingParameterDefinition,
     QgsProject,
+    QgsRectangle,
     QgsRenderContext,
 )
+from qgis.gui import QgsMapCanvas
 from qgis.PyQt.QtCore import QCoreApplication, QTranslator
 
 PLACE = Path(sys.argv[1])
@@ -136,6 +141,19 @@ def tools() -> dict[str, Any]:
         }
         for item in provider.algorithms()
     }
+
+
+def default_extent() -> str:
+    """Return the default extent of the download where QGIS has a canvas, and make all tools."""
+    canvas = QgsMapCanvas()
+    canvas.setDestinationCrs(QgsCoordinateReferenceSystem("EPSG:2154"))
+    canvas.setExtent(QgsRectangle(700_000, 6_600_000, 700_100, 6_600_100))
+    utils.iface = SimpleNamespace(mapCanvas=lambda: canvas)
+    for item in QgsApplication.processingRegistry().providerById("semsig").algorithms():
+        algorithm(item.name())
+    parameter = algorithm("fetchcanvas").parameterDefinition("AREA_EXTENT")
+    utils.iface = None
+    return str(parameter.defaultValue())
 
 
 def show_twice() -> dict[str, Any]:
@@ -263,6 +281,7 @@ def play() -> dict[str, Any]:
     cancelled = {"OUT": str(PLACE / "cancelled.parquet"), "CELLS": shown()}
     results = {
         "tools": tools(),
+        "extent": default_extent(),
         "loaded": run("load", FILES=lamps, CATALOG_FILE=sys.argv[2], OUT=loaded).ended[0],
         **show_twice(),
         **show(json.loads(sys.argv[3])),

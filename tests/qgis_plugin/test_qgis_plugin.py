@@ -328,6 +328,7 @@ def test_tools_have_numbers_help_and_variants(session: dict[str, Any], qgis: Qgi
     assert numbered == {"1": "load", "2": "build", "3": "localize", "4": "evaluate"}
     assert set(tools) == set(commands()) - {*LEFT_OUT} | {"ambiguity", "fetchcanvas"}
     assert set(tools["fetchcanvas"]["parameters"]) == {"AREA_EXTENT", "OUT", "BUILDINGS", "STREETS"}
+    assert re.fullmatch(r"[\d.,]+ \[EPSG:2154\]", session["extent"])
     assert set(tools["ambiguity"]["parameters"]) == {"DATABASE", "OUT", "MAP"}
     text = tools["localize"]["help"]
     assert "“2. Build signature database”" in text
