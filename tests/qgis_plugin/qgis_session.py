@@ -151,9 +151,9 @@ def default_extent() -> str:
     utils.iface = SimpleNamespace(mapCanvas=lambda: canvas)
     for item in QgsApplication.processingRegistry().providerById("semsig").algorithms():
         algorithm(item.name())
-    parameter = algorithm("fetchcanvas").parameterDefinition("AREA_EXTENT")
+    download = algorithm("fetchcanvas")  # its parameters live as long as it does
     utils.iface = None
-    return str(parameter.defaultValue())
+    return str(download.parameterDefinition("AREA_EXTENT").defaultValue())
 
 
 def show_twice() -> dict[str, Any]:
