@@ -1008,6 +1008,10 @@
         <translation>Objekte in beiden bleiben nur einmal, und Zellen nahe bei beiden werden neu berechnet.</translation>
     </message>
     <message>
+        <source>Objects of the query</source>
+        <translation>Objekte der Anfrage</translation>
+    </message>
+    <message>
         <source>Older versions and interrupted runs leave them; the database is not changed.</source>
         <translation>Ältere Versionen und abgebrochene Läufe hinterlassen sie; die Datenbank wird nicht geändert.</translation>
     </message>
@@ -1054,10 +1058,6 @@
     <message>
         <source>Pitch</source>
         <translation>Neigung</translation>
-    </message>
-    <message>
-        <source>Place</source>
-        <translation>Ort</translation>
     </message>
     <message>
         <source>Popularity of places</source>

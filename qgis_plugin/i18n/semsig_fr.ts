@@ -1008,6 +1008,10 @@
         <translation>Les objets présents dans les deux sont gardés une fois, et les cellules proches des deux sont recalculées.</translation>
     </message>
     <message>
+        <source>Objects of the query</source>
+        <translation>Objets de la requête</translation>
+    </message>
+    <message>
         <source>Older versions and interrupted runs leave them; the database is not changed.</source>
         <translation>Des versions antérieures et des exécutions interrompues les laissent ; la base n’est pas modifiée.</translation>
     </message>
@@ -1054,10 +1058,6 @@
     <message>
         <source>Pitch</source>
         <translation>Tangage</translation>
-    </message>
-    <message>
-        <source>Place</source>
-        <translation>Lieu</translation>
     </message>
     <message>
         <source>Popularity of places</source>

@@ -276,7 +276,7 @@ class SemsigDock(QgsDockWidget):
 
     def _show_lookalikes(self, cell: dict[str, Any], answer: dict[str, Any]) -> None:
         candidates = answer["candidates"]
-        others = [row["place"] for row in candidates if row["cell"] != cell["cell"]]
+        others = [row["place"] for row in candidates if row["cell_id"] != cell["cell"]]
         self._remove_highlights()
         self._highlight(others, LOOKALIKE_COLOUR, 12)
         self._highlight([cell["place"]], CELL_COLOUR, 20)

@@ -343,7 +343,7 @@ def test_answer_is_written_with_styles(qgis: Qgis) -> None:
     database, _ = small_city()
     file = qgis.place / "answer.gpkg"
     styles = gpd.read_file(file, layer="layer_styles")
-    assert set(styles["f_table_name"]) == {*LAYERS_OF_ANSWER}
+    assert set(styles["f_table_name"]) == {*LAYERS_OF_ANSWER, "ellipse"}
     best, place, area = (gpd.read_file(file, layer=name) for name in LAYERS_OF_ANSWER)
     assert best["rank"].tolist() == [1, 2, 3]
     assert best["cell_id"][0] == database.cell_ids[database.lengths.argmax()]
@@ -371,6 +371,7 @@ def test_layers_are_shown_with_styles(session: dict[str, Any]) -> None:
     assert session["shown"] == {
         "Candidates": ["graduatedSymbol", "rank"],
         "Place": ["categorizedSymbol", "answer"],
+        "Ellipse of the place": ["categorizedSymbol", "answer"],
         "Regions to search": ["graduatedSymbol", "rank"],
         "Signature cells": ["graduatedSymbol", "chance_found"],
         "Street objects": ["categorizedSymbol", "class_code"],
@@ -391,7 +392,7 @@ def test_qgis_reads_the_translations(session: dict[str, Any], package: SimpleNam
 def test_layers_are_in_groups_with_points_above_areas(session: dict[str, Any]) -> None:
     title = commands()["localize"].title
     assert sorted(session["groups"][title][:2]) == ["Candidates", "Place"]
-    assert session["groups"][title][2:] == ["Regions to search"]
+    assert session["groups"][title][-1] == "Regions to search"
     assert session["groups"][commands()["export"].title] == ["Street objects", "Signature cells"]
 
 
