@@ -189,7 +189,7 @@ def _parameter(field: Field) -> inspect.Parameter:
     option = field.option
     whole = field.kind is int
     about: dict[str, Any] = {
-        "metavar": option.metavar or None if option.positional else field.metavar,
+        "metavar": None if option.positional else field.metavar,
         "min": int(option.low) if whole and option.low is not None else option.low,
         "max": int(option.high) if whole and option.high is not None else option.high,
     }

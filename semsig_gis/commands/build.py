@@ -167,7 +167,7 @@ class Build:
     ) -> tuple[int, int]:
         """Write a database in one file with its object store; return its cells and entries."""
         from semsig_gis.database import ObjectStore, build_database, save_with_store
-        from semsig_gis.objects import read_surroundings
+        from semsig_gis.objects import read_surroundings, with_notes
 
         notes: list[str] = []
         read = partial(read_surroundings, crs=objects.crs, tell=notes.append)
@@ -180,7 +180,7 @@ class Build:
             )
         for note in notes:
             reporter.remark(note)
-        objects = replace(objects, notes=(*objects.notes, *notes))
+        objects = with_notes(objects, (*objects.notes, *notes))
         with reporter.progress("building") as advance:
             database = build_database(
                 objects, footprints=houses, streets=lines, progress=advance, **specs

@@ -208,7 +208,8 @@ class Field:
         """The default, the range, and whether the value is required, for the help."""
         option = self.option
         default = option.default
-        if not default and self.default not in {None, False, ""}:
+        hidden = self.default is None or self.default is False or self.default == ""
+        if not default and not hidden:
             default = self.flag if self.kind is bool else _text(self.default)
         details = [f"default: {default}"] if default else []
         if option.low is not None and option.high is not None:

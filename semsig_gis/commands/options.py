@@ -651,12 +651,13 @@ def numbers(text: str, option: str) -> list[float]:
 
 def known_identifiability(city: City, reporter: Reporter) -> Identifiability | None:
     """Return the columns of `semsig identify`; None if missing, with a remark if outdated."""
+    database = city.database  # raises DatabaseError if the file is none
     try:
         if not city.has_columns:
             return None
         from semsig_gis.evaluation import open_identifiability
 
-        return open_identifiability(city.database, city.path)
+        return open_identifiability(database, city.path)
     except DatabaseError as error:
         reporter.remark(str(error))
         return None

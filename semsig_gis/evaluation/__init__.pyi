@@ -19,7 +19,6 @@ from .experiments.tables import experiment_markdown as experiment_markdown
 from .experiments.tables import experiment_tables as experiment_tables
 from .figures import AMBIGUITIES as AMBIGUITIES
 from .figures import LENGTHS as LENGTHS
-from .figures import CalibrationRecord as CalibrationRecord
 from .figures import calibration_bins as calibration_bins
 from .figures import coverage_curve as coverage_curve
 from .figures import district_labels as district_labels

@@ -2,7 +2,6 @@
 
 from .answers import REGION_SHARE as REGION_SHARE
 from .answers import Answer as Answer
-from .answers import AnswerRecord as AnswerRecord
 from .answers import Ranking as Ranking
 from .distance.memo import DistanceMemo as DistanceMemo
 from .distance.method import Method as Method
@@ -119,11 +118,9 @@ from .locator import parse_method as parse_method
 from .locator import usual_noise as usual_noise
 from .noise.levels import Level as Level
 from .noise.levels import level_mixture as level_mixture
-from .noise.model import MixtureRecord as MixtureRecord
 from .noise.model import Noise as Noise
 from .noise.model import NoiseMixture as NoiseMixture
 from .noise.model import NoiseSpec as NoiseSpec
-from .noise.model import SpecRecord as SpecRecord
 from .noise.model import cell_noise as cell_noise
 from .noise.model import noise_from_dict as noise_from_dict
 from .noise.model import open_noise as open_noise

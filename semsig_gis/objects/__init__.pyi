@@ -44,3 +44,4 @@ from .table import objects_of as objects_of
 from .table import objects_specs as objects_specs
 from .table import open_objects as open_objects
 from .table import save_objects as save_objects
+from .table import with_notes as with_notes

@@ -120,7 +120,6 @@ from .qgis.geopackage import read_geopackage as read_geopackage
 from .qgis.project import project_archive as project_archive
 from .qgis.project import shown_layers as shown_layers
 from .qgis.qml import CLASS_MARKERS as CLASS_MARKERS
-from .qgis.qml import CLEAR as CLEAR
 from .qgis.qml import by_pixel as by_pixel
 from .qgis.qml import renderer as renderer
 from .rasters import RASTERS as RASTERS

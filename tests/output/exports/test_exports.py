@@ -71,8 +71,10 @@ def test_exported_answer_contains_regions_and_candidates(
         for column in ("searched_km2", "searched_percent"):
             assert read[column].tolist() == regions.table[column].tolist()
     assert pyogrio.list_layers(file)[:, 0].tolist() == [
-        *("regions", "candidates"), *(["place"] if answer is LOCATION else []), "layer_styles",
-    ]  # fmt: skip
+        *("regions", "candidates"),
+        *(("place", "ellipse", "rays") if answer is LOCATION else ()),
+        "layer_styles",
+    ]
     candidates = gpd.read_file(file, layer="candidates")
     assert candidates["cell_id"].tolist() == answer.candidates["cell_id"].tolist()
     facts = pyogrio.read_info(file, layer="regions")["layer_metadata"]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 CITY, _ = small_city()
 CHANCES = chances_of(CITY)
 DETAIL = 15
-ASSETS = Path(__file__).parents[1] / "assets"
+ASSETS = Path(__file__).parents[2] / "assets"
 
 
 @pytest.fixture(scope="module")
