@@ -13,6 +13,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat, StrictInt, create_model
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import ValidationError, core_schema
@@ -45,8 +46,8 @@ ACCEPTED = {
     "mapping_type": "a table",
     "model_type": "a table",
     "dataclass_type": "a table",
-    "too_short": "at least {min_length}",
-    "too_long": "at most {max_length}",
+    "too_short": "at least {min_length} entries",
+    "too_long": "at most {max_length} entries",
 }
 UNKNOWN_KEYS = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
 MOST_CHARACTERS = 60  # of a value in a message
@@ -106,11 +107,19 @@ def number(
 ) -> Accepts:
     """Return the type of a number from `least`, or only `above` it, to `most`; `whole` or not.
 
-    A bool is not a number. NaN is never accepted, infinity only without a limit.
+    A bool is not a number. NaN is never accepted, infinity only without a limit. A number of numpy
+    is read as one of Python.
     """
     bounds: dict[str, Any] = {"gt" if above else "ge": least, "le": most}
     make = core_schema.int_schema if whole else core_schema.float_schema
-    return Accepts(words, make(strict=True, **bounds))
+    schema = core_schema.no_info_before_validator_function(
+        _python_number, make(strict=True, **bounds)
+    )
+    return Accepts(words, schema)
+
+
+def _python_number(value: object) -> object:
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def metres(most: float) -> Accepts:
@@ -203,6 +212,9 @@ def _error(
         return kind(f"{_place(where, values, path)}: {first['ctx']['error']}")
     verb = "write" if kind is CatalogError else "give"
     value = f"{first['input']!r:.{MOST_CHARACTERS}}"
+    if first["loc"][-1:] == ("[key]",):
+        place = _place(where, values, path[:-1])
+        return kind(f"{place} has the key {value}{_remedy(first, verb)}.")
     if not path or isinstance(path[-1], int):
         return kind(f"{_place(where, values, path)} is {value}{_remedy(first, verb)}.")
     place, key = _place(where, values, path[:-1]), str(path[-1])
@@ -224,6 +236,7 @@ def _remedy(fault: ErrorDetails, verb: str) -> str:
         near = nearest_name(str(fault["input"]), re.findall("'(.*?)'", words))
         return f"{near}; {verb} {words}"
     words = ACCEPTED.get(fault["type"], fault["msg"]).format(**fault.get("ctx", {}))
+    words = words.replace(" 1 entries", " 1 entry")
     return f"; {verb} {words.replace('Input should be', 'a value that is')}"
 
 

@@ -46,7 +46,7 @@ class RuleRecord(TypedDict):
 _Share = Annotated[
     float, number("a share above 0 and below 1", 0, math.nextafter(1, 0), above=True)
 ]
-_Count = Annotated[int, number("a number of queries", 0, whole=True)]
+_Count = Annotated[int, number("a whole number of queries, 0 or more", 0, whole=True)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -78,7 +78,7 @@ class MixtureRecord(TypedDict):
 
 def _check_shares(shares: Mapping[str, float]) -> Mapping[str, float]:
     total = math.fsum(shares.values())
-    if shares and abs(total - 1.0) > ROUNDING:
+    if abs(total - 1.0) > ROUNDING:
         raise InputError(f"the shares sum to {total:.6g}; give shares that sum to 1.")
     return shares
 
@@ -98,6 +98,9 @@ _Error = Annotated[
     float, number(f"a number above 0 and up to {MOST_ERROR:g}", 0, MOST_ERROR, above=True)
 ]
 _Shares = Annotated[Mapping[str, _Chance], Parsed(_check_shares)]
+_SharesIfAny = Annotated[
+    Mapping[str, _Chance], Parsed(lambda shares: shares and _check_shares(shares))
+]
 _Fading = Annotated[
     Sequence[Sequence[float]],
     Parsed(
@@ -175,7 +178,7 @@ class NoiseSpec(Displayed):
     misnamed_by_class: Mapping[str, _Chance] = field(default_factory=dict)
     confusion: Mapping[str, _Shares] = field(default_factory=dict)
     clutter: _Amount = 1.0
-    clutter_shares: _Shares = field(default_factory=dict)
+    clutter_shares: _SharesIfAny = field(default_factory=dict)
     bearing_sigma: _Degrees = 5.0
     bearing_sigma_by_class: Mapping[str, _Degrees] = field(default_factory=dict)
     position_sigma: _Amount = 0.0
@@ -304,7 +307,8 @@ def noise_from_dict(values: Mapping[str, Any], *, where: str = "the noise") -> N
 
     Values are the fields of `NoiseSpec`, all optional, or of a mixture of plain models.
     """
-    if isinstance(values, dict) and "specs" in values:
+    # A file may hold any value.
+    if isinstance(values, Mapping) and "specs" in values:  # type: ignore[redundant-expr]
         return read_table(NoiseMixture, values, where, error=InputError)
     return read_table(NoiseSpec, values, where, error=InputError)
 

@@ -379,7 +379,8 @@ def test_a_rule_decides_on_a_posterior() -> None:
 
 @pytest.mark.parametrize("threshold", [0.75, math.inf])
 def test_a_rule_is_saved_and_opened(tmp_path: Path, threshold: float) -> None:
-    rule = AnswerRule(threshold=threshold, queries=10, answered=5, wrong=1)
+    count = np.int64(10)
+    rule = AnswerRule(threshold=threshold, queries=count, answered=5, wrong=1)  # type: ignore[arg-type]
     save_rule(rule, tmp_path / "rule.json")
     assert open_rule(tmp_path / "rule.json") == rule
     assert math.isnan(AnswerRule(threshold=0.5).coverage)

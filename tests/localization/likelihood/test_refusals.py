@@ -124,6 +124,7 @@ CASES: list[tuple[Callable[[], object], str, str]] = [
     (lambda: AnswerRule(threshold=0.5, precision=1.0), "precision = 1.0", "below 1"),
     (lambda: AnswerRule(threshold=0.5, confidence=0.0), "confidence = 0.0", "above 0"),
     (lambda: AnswerRule(threshold=0.5, radius=math.inf), "radius = inf", "above 0"),
+    (lambda: AnswerRule(threshold=0.5, queries=1.0), "queries = 1.0", "a whole number of queries"),  # type: ignore[arg-type]
     (lambda: AnswerRule(threshold=0.5, wrong=1), "1 wrong", "counts that fit"),
     (lambda: calibrate([0.5], []), "1 chances and 0 outcomes", "one outcome"),
     (lambda: calibrate([math.nan], [True]), "1 chances", "one finite chance"),

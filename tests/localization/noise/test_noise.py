@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from semsig_gis.localization import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from semsig_gis.localization import Noise, NoiseTable
@@ -57,12 +59,15 @@ if TYPE_CHECKING:
             {"confusion": {"bench": {"bench": -1, "bus_stop": 2}}},
             "confusion, bench has bench = -1; give a chance",
         ),
+        ({"confusion": {"bench": {}}}, "the noise, confusion, bench: the shares sum to 0;"),
+        ({"confusion": {5: {"bench": 1}}}, "the noise, confusion has the key 5; give a string"),
         ({"confusion": {"bench": 1}}, "confusion has bench = 1; give a table"),
         ({"clutter_shares": {"bench": 0.4}}, "clutter_shares: the shares sum to 0.4"),
         ({"detecton": 0.4}, "the key 'detecton', which is unknown; the nearest is 'detection'"),
         ({"name": 3}, "the noise has name = 3; give a string"),
         ({"specs": []}, "the noise lacks the key 'weights'"),
         ({"specs": [], "weights": []}, "give at least one model"),
+        (MappingProxyType({"specs": [], "weights": []}), "give at least one model"),
         (
             {"specs": [{}], "weights": [0.5]},
             "weights of the mixture are (0.5,); give chances that sum to 1",
@@ -75,7 +80,7 @@ if TYPE_CHECKING:
         ({"specs": [{"clutter": -1}], "weights": [1]}, "spec 1 has clutter = -1"),
     ],
 )
-def test_invalid_models_are_refused(values: dict[str, object], fault: str) -> None:
+def test_invalid_models_are_refused(values: Mapping[str, object], fault: str) -> None:
     with refused(InputError, fault):
         noise_from_dict(values)
 
