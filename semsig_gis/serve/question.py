@@ -17,7 +17,6 @@ from semsig_gis.core import (
     MOST_SEED,
     Accepts,
     FileTable,
-    Flag,  # noqa: TC001 - of fields
     InputError,
     UnknownNameError,
     file_key,
@@ -56,26 +55,35 @@ DEFAULT_TOP = 10  # of `semsig localize`
 BOX_LENGTH = 4
 MOST_PIXELS = 1_000_000
 
-_Lat = Annotated[float, number("a latitude", -90, 90)]
-_Lon = Annotated[float, number("a longitude", -360, 360)]
+_Lat = Annotated[float, number("a latitude from -90 to 90", -90, 90)]
+_Lon = Annotated[float, number("a longitude from -360 to 360", -360, 360)]
 _Degrees = Annotated[float, number("degrees from -360 to 360", -FULL_TURN, FULL_TURN)]
-_Metres = Annotated[float, number("metres", -MOST_METRES, MOST_METRES)]
-_Pixel = Annotated[float, number("a number of pixels", -MOST_PIXELS, MOST_PIXELS)]
+_Metres = Annotated[
+    float,
+    number(f"metres from {-MOST_METRES:,} to {MOST_METRES:,}", -MOST_METRES, MOST_METRES),
+]
+_Pixel = Annotated[
+    float,
+    number(f"pixels from {-MOST_PIXELS:,} to {MOST_PIXELS:,}", -MOST_PIXELS, MOST_PIXELS),
+]
 _Side = Annotated[
     int, number(f"a whole number from 1 to {MOST_PIXELS:,}", 1, MOST_PIXELS, whole=True)
 ]
-_Fov = Annotated[float, number("a field of view in degrees", -FULL_TURN, FULL_TURN)]
+_Fov = Annotated[float, number("a field of view of up to 360 degrees", -FULL_TURN, FULL_TURN)]
 _Box = Annotated[
     tuple[_Pixel, _Pixel, _Pixel, _Pixel],
-    Accepts("left, top, right and bottom of a box in pixels"),
+    Accepts(f"left, top, right and bottom of a box in pixels, up to {MOST_PIXELS:,}"),
 ]
-LatLon = Annotated[tuple[_Lat, _Lon], Accepts("latitude and longitude in degrees")]
+LatLon = Annotated[
+    tuple[_Lat, _Lon],
+    Accepts("latitude and longitude in degrees, from -90 to 90 and from -360 to 360"),
+]
 
 
 class _Seen(FileTable, extra="ignore"):
     """The class and the range of a marked object, which `parse_view` checks."""
 
-    kind: Annotated[Any, file_key("class")] = "?"
+    kind: Annotated[Any, file_key("class")]
     range: Any = None
     range_error: Any = None
 
@@ -85,17 +93,18 @@ class _CompassMark(_Seen):
 
 
 class _PhotoMark(_Seen):
+    kind: Annotated[Any, file_key("class")] = "?"
     x: _Pixel | None = None
     y: _Pixel | None = None
     box: _Box | None = None
 
 
 class PagePhoto(FileTable, extra="ignore"):
-    """A photo of the page; only one with marks needs a field of view."""
+    """A photo of the page; only one with marks needs a size and a field of view."""
 
-    name: str = ""
-    width: _Side
-    height: _Side
+    name: str | None = None
+    width: _Side | None = None
+    height: _Side | None = None
     fov: _Fov | None = None
     projection: Any = None
     heading: _Degrees | None = None
@@ -104,9 +113,11 @@ class PagePhoto(FileTable, extra="ignore"):
 
     @property
     def camera(self) -> Camera:
-        """The camera; InputError if the field of view is missing or does not fit."""
-        if self.fov is None:
-            raise InputError("the field of view of a photo is missing; give it in degrees.")
+        """The camera; InputError if its size or field of view is missing or does not fit."""
+        if self.width is None or self.height is None or self.fov is None:
+            raise InputError(
+                "the width, height or field of view of a photo is missing; give pixels and degrees."
+            )
         return Camera(
             width=self.width,
             height=self.height,
@@ -165,9 +176,16 @@ class _PageQuestion(FileTable, extra="ignore"):
     truth: LatLon | None = None
     absent: Annotated[tuple[str, ...], Accepts("a list of names of classes")] | None = None
     near: (
-        Annotated[tuple[_Lat, _Lon, _Metres], Accepts("latitude, longitude and metres")] | None
+        Annotated[
+            tuple[_Lat, _Lon, _Metres],
+            Accepts(
+                "latitude from -90 to 90, longitude from -360 to 360, and metres up to "
+                f"{MOST_METRES:,}"
+            ),
+        ]
+        | None
     ) = None
-    quick: Flag = False
+    quick: Any = False  # any other value than True is False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -226,7 +244,7 @@ class Question:
             truth=page.truth,
             absent=_absent_codes(page.absent or (), taxonomy),
             near=None if page.near is None else _near_text(*page.near),
-            quick=page.quick,
+            quick=page.quick is True,
         )
 
     def rows(self, taxonomy: Taxonomy) -> list[dict[str, Any]]:

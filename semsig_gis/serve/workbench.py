@@ -250,7 +250,7 @@ class Workbench:
         """Return the boxes of a detector's file as marks of the photos of the page."""
         request = read_table(PageBoxes, body, "the request", error=InputError)
         name = PurePosixPath(request.name or "boxes.json").name or "boxes.json"
-        photos = {photo.name: photo for photo in request.photos}
+        photos = {photo.name or "": photo for photo in request.photos}
         shots = {key: _shot(photo) for key, photo in photos.items()}
         stems = {PurePosixPath(key).stem: key for key in photos}
         # The readers of detections expect files, with the labels of YOLO next to the boxes.

@@ -316,6 +316,14 @@ def test_marks_keep_their_numbers_in_sorted_views(bench: Workbench) -> None:
         ({"views": [3]}, "view 1 is 3; give a table"),
         ({"views": [{"photos": 1}]}, "list"),
         ({"views": [{"photos": [{"marks": [{}]}]}]}, "width"),
+        ({"views": [{}] * 21}, "give at most 20 entries."),
+        ({"views": [{"compass": [{"bearing": 5}]}]}, "compass 1 lacks the key 'class'"),
+        (
+            {"views": [{"step": {"bearing": 0, "metres": 1e8}}]},
+            "metres = 100000000.0; give metres from -1,000,000 to 1,000,000",
+        ),
+        ({"near": [91, 3, 1]}, "latitude from -90 to 90, longitude from -360 to 360"),
+        ({"width": None}, "width"),
         ({"view": 7}, "view"),
         ({"top": 0}, "top"),
         ({"top": True}, "top"),
@@ -323,7 +331,7 @@ def test_marks_keep_their_numbers_in_sorted_views(bench: Workbench) -> None:
         ({"noise": "loud"}, "loud"),
         ({"noise": []}, "noise model"),
         ({"truth": [1]}, "truth = [1]; give latitude and longitude"),
-        ({"truth": [100, 3]}, "latitude"),
+        ({"truth": [100, 3]}, "from -90 to 90"),
         ({"fov": 300}, "field of view"),
         ({"fov": None}, "field of view"),
         ({"projection": "flat"}, "flat"),
@@ -346,7 +354,7 @@ def test_invalid_question_is_refused(page: Page, change: dict[str, Any], word: s
 
 
 MARK = {"x": 10, "y": 10, "box": [1, 2, 3, 4], "class": "bench", "range": "near"}
-ROUTE = {
+ROUTE: dict[str, Any] = {
     "views": [
         {"photos": [{**SIDE, "fov": FOV, "heading": 0.0, "heading_error": 5, "marks": [MARK]}]},
         {"compass": [{"class": "bench", "bearing": 5.0}], "step": {"bearing": 9.0, "metres": 1.0}},
@@ -362,6 +370,17 @@ def test_changed_question_is_refused_in_a_sentence_or_parsed(question: dict[str,
         Question.parse(question, taxonomy=paper_taxonomy(), radius=30.0)
     except SemsigError as error:
         assert_sentence(error)
+
+
+@pytest.mark.parametrize("quick", [None, 1, False])
+def test_saved_question_may_lack_values(*, quick: object) -> None:
+    (marked,) = ROUTE["views"][0]["photos"]
+    photos = [{**marked, "name": None}, {"name": "b.jpg", "width": None, "marks": []}, {}]
+    question = Question.parse(
+        {"views": [{"photos": photos}], "quick": quick}, taxonomy=paper_taxonomy(), radius=30.0
+    )
+    assert not question.quick
+    assert len(question.views) == 1
 
 
 def test_detector_boxes_become_marks(page: Page) -> None:
