@@ -49,7 +49,9 @@ class ClassChange:
     added: _Count = 0
     removed: _Count = 0
     moved: _Count = 0
-    moved_m: Annotated[float, number("metres, 0 or more", 0, MOST_METRES)] | None = None
+    moved_m: (
+        Annotated[float, number(f"metres from 0 to {MOST_METRES:,}", 0, MOST_METRES)] | None
+    ) = None
     gained: _Count = 0
     lost: _Count = 0
 

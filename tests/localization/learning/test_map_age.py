@@ -167,6 +167,10 @@ BENCH = {"class_name": "bench", "before": 5}
         ),
         ({"years": 1, "classes": [{**BENCH, "removed": 6}]}, "than the 5 there were before"),
         ({"years": 1, "classes": [{**BENCH, "moved": 1}]}, "lacks moved_m; give metres"),
+        (
+            {"years": 1, "classes": [{**BENCH, "moved_m": 1e9}]},
+            "moved_m = 1000000000.0; give metres from 0 to 1,000,000",
+        ),
         ({"years": 1, "classes": [{**BENCH, "before": 0}]}, "has no objects from before"),
     ],
 )
