@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyogrio
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
+from pyproj import CRS
 
 from semsig_gis.core import GEOMETRY, InputError
 from semsig_gis.output.layers.model import GEOMETRY_TYPES
@@ -62,11 +63,13 @@ def write_features(
             errors.append(error)
             raise
 
+    # The code that PROJ finds may be of a CRS that is only similar.
     code = layer.crs.to_epsg()
+    same = code is not None and CRS.from_epsg(code).equals(layer.crs, ignore_axis_order=True)
     geometry = {
         "geometry_name": GEOMETRY,
         "geometry_type": GEOMETRY_TYPES.get(layer.geometry),
-        "crs": layer.crs.to_wkt() if code is None else f"EPSG:{code}",
+        "crs": f"EPSG:{code}" if same else layer.crs.to_wkt(),
     }
     try:
         pyogrio.write_arrow(

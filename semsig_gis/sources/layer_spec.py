@@ -264,9 +264,9 @@ class LayerSpec:
             raise CatalogError("the key 'class' is missing; add it.")
         if not is_objects and self.class_name:
             raise CatalogError(f"a layer of {self.role} needs no class; remove it.")
-        for name in (self.class_name, *(name for _, name in (by.classes if by else ()))):
-            if name:
-                taxonomy.by_name(name)
+        names = [name for _, name in by.classes] if by else []
+        for name in [self.class_name, *names] if self.class_name else names:
+            taxonomy.by_name(name)
         for key in ("width_by", "width_field", "name_field"):
             if self.role != "streets" and getattr(self, key) is not None:
                 raise CatalogError(f"only streets have {key}; remove it or add its role.")

@@ -37,6 +37,23 @@ if TYPE_CHECKING:
     Publication = Callable[[str], Path]
 
 DATA = Path(__file__).with_name("data")
+CODED_DOMAIN = """
+CREATE TABLE gpkg_data_columns (
+    table_name TEXT, column_name TEXT, name TEXT, title TEXT, description TEXT, mime_type TEXT,
+    constraint_name TEXT
+);
+CREATE TABLE gpkg_data_column_constraints (
+    constraint_name TEXT, constraint_type TEXT, value TEXT, min NUMERIC, min_is_inclusive BOOLEAN,
+    max NUMERIC, max_is_inclusive BOOLEAN, description TEXT
+);
+INSERT INTO gpkg_extensions
+SELECT column1, NULL, 'gpkg_schema', 'http://www.geopackage.org/spec/#extension_schema',
+    'read-write' FROM (VALUES ('gpkg_data_columns'), ('gpkg_data_column_constraints'));
+INSERT INTO gpkg_data_columns (table_name, column_name, constraint_name)
+VALUES ('trees', 'kind', 'kinds');
+INSERT INTO gpkg_data_column_constraints (constraint_name, constraint_type, value, description)
+VALUES ('kinds', 'enum', '1', 'oak'), ('kinds', 'enum', '2', 'elm'), ('kinds', 'enum', '4', NULL);
+"""
 FORMATS = ("csv", "fgb", "geojson", "gpkg", "shp", "zip")
 
 pytestmark = pytest.mark.usefixtures("engine")
@@ -167,7 +184,22 @@ def test_corrupt_records_are_counted(fountains: Path, engine: str) -> None:
     assert layer.table.geometry.isna().sum() == 1
 
 
-def test_shapefile_without_encoding_is_latin(tmp_path: Path) -> None:
+@pytest.mark.parametrize("encoding", ["UTF-8", "ISO-8859-1"])
+def test_shapefile_without_encoding_is_utf8_or_else_latin(
+    tmp_path: Path, encoding: str, engine: str
+) -> None:
+    if (engine, encoding) == ("fiona", "UTF-8"):
+        pytest.skip("fiona, which reads damaged files, assumes Latin-1")
+    table = frame([(1, 2), (3, 4)], kind=["allée", "square"])
+    path = tmp_path / "things.shp"
+    table.to_file(path, encoding=encoding)
+    path.with_suffix(".cpg").unlink()
+    layer = read(path, where=(("kind", ("allée",)),))
+    assert xy(layer) == [[1, 2]]
+    assert (counts(layer), layer.notes) == ((2, 1, 0), ())
+
+
+def test_field_names_of_a_shapefile_without_encoding_are_latin(tmp_path: Path) -> None:
     table = frame([(1, 2), (3, 4)], catégorie=["allée", "square"])
     path = tmp_path / "things.shp"
     table.to_file(path, encoding="ISO-8859-1")
@@ -516,6 +548,23 @@ def test_layers_of_a_container(container: Path) -> None:
         read(container)
     with refused(UnknownNameError, "no layer 'light'; the nearest is 'lights'"):
         read(container, layer="light")
+
+
+def test_values_of_a_coded_domain_are_their_labels(tmp_path: Path, engine: str) -> None:
+    if engine == "fiona":
+        pytest.skip("fiona, which reads damaged files, returns the codes")
+    path = tmp_path / "city.gpkg"
+    kinds = pd.array([1, 2, 7, 4, None], dtype="Int32")
+    frame([(n, n) for n in range(5)], kind=kinds).to_file(path, layer="trees")
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        connection.executescript(CODED_DOMAIN)
+    names = ("oak", "elm", "7", "4", "none")  # two codes are without a label
+    for row, name in enumerate(names):
+        layer = read(path, where=(("kind", (name,)),))
+        assert (xy(layer), counts(layer)) == ([[row, row]], (5, 1, 0))
+    by = ClassBy("kind", (("oak", "bench"), ("elm", "street_light")))
+    layer = read(path, class_name=None, class_by=by)
+    assert layer.table["class_name"].tolist() == ["bench", "street_light"]
 
 
 def test_tables_without_geometry_are_ignored(container: Path, tmp_path: Path) -> None:

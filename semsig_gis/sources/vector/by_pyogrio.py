@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyogrio
 import shapely
 from pyogrio.raw import open_arrow, read
@@ -227,23 +228,27 @@ def _read(
     """Return names, values and well-known binary of `size` rows; raise if a row cannot be read.
 
     Text that is not UTF-8 raises; with a list `undecoded` it becomes None and its field is added to
-    the list. A shapefile without a stated encoding is read as Latin-1, as fiona does.
+    the list. A shapefile that does not state its encoding and is not UTF-8 is read as Latin-1.
     """
     options: dict[str, Any] = {"layer": member.layer, "columns": list(fields), "encoding": encoding}
     options |= {"skip_features": start}
     with open_arrow(
         member.address, return_fids=True, batch_size=size, use_pyarrow=True, **options
     ) as (meta, reader):
-        batch: Any = next(reader, ()) if encoding or meta["encoding"] != LATIN else None
-    if batch is None:
-        return _read(member, fields, start, size, undecoded=undecoded, encoding=LATIN)
+        batch: Any = next(reader, ())
     if len(batch) != size:  # Arrow stops without a message; the other reader raises the error
         read(member.address, max_features=size, **options)
         raise ValueError("cannot be read")
+    if meta["encoding"] == LATIN and not encoding:  # GDAL assumes it without a stated encoding
+        try:
+            for column in batch.columns:  # raises as well if a name is not UTF-8
+                column.validate(full=True)
+        except (pa.ArrowInvalid, UnicodeDecodeError):
+            return _read(member, fields, start, size, undecoded=undecoded, encoding=LATIN)
     # By number, because the column of row numbers, the first one, may have the name of a field. The
     # last one is the geometry; in a table without geometry nobody uses it.
     arrays = dict(zip(meta["fields"].tolist(), batch.columns[1:], strict=False))
-    columns = {field: arrays[field] for field in fields}
+    columns = {field: _labels(arrays[field]) for field in fields}
     for field, column in columns.items():
         try:
             column.validate(full=True)
@@ -254,6 +259,15 @@ def _read(
             texts = [_decoded(value) for value in column.cast("binary").to_pylist()]
             columns[field] = pa.array(texts, pa.string())
     return list(map(str, batch.column(0).to_pylist())), columns, batch.columns[-1]
+
+
+def _labels(column: pa.Array) -> pa.Array:
+    """Return the labels of a field with a coded domain, and codes without a label as text."""
+    if not pa.types.is_dictionary(column.type):
+        return column
+    codes, labels = column.indices, column.dictionary
+    codes_in_domain = pc.if_else(pc.less(codes, len(labels)), codes, None)
+    return pc.coalesce(labels.take(codes_in_domain), codes.cast(pa.string()))
 
 
 def _decoded(value: bytes | None) -> str | None:

@@ -12,6 +12,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pyogrio
 import pytest
+from pyproj import CRS
 from sentences import refused
 from small_city import chances_of, small_city, small_evaluation
 
@@ -222,3 +223,12 @@ def test_format_of_another_package_does_not_replace_ours(
     install("other_files", "semsig_gis.exports", CODE, csv="lines")
     with refused(InputError, "'csv' of semsig_gis.exports is provided by semsig_gis itself"):
         export_database(CITY, tmp_path / "b.lines")
+
+
+@pytest.mark.parametrize("suffix", ["gpkg", "fgb"])
+def test_crs_that_is_only_similar_to_a_code_is_kept(suffix: str, tmp_path: Path) -> None:
+    # PROJ finds the code 25831 for it, which has another datum.
+    similar = CRS("+proj=utm +zone=31 +ellps=GRS80 +units=m")
+    city = dataclasses.replace(CITY, crs=similar)
+    export_database(city, tmp_path / f"a.{suffix}", layers="cells")
+    assert gpd.read_file(tmp_path / f"a.{suffix}", layer="cells").crs.equals(similar)
