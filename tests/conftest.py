@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     Run = Callable[..., tuple[int, str, str]]
     RunOk = Callable[..., str]
 
-# QGIS runs it with its own Python.
-collect_ignore = ["qgis_plugin/qgis_session.py"]
+# QGIS runs the first with its own Python; importing the second would register its command.
+collect_ignore = ["qgis_plugin/qgis_session.py", "core/data"]
 
 # Twenty examples are enough in a suite that is run many times. To try five hundred:
 # pytest -m hypothesis --hypothesis-profile semsig-soak
