@@ -468,6 +468,10 @@
         <translation>Die Änderungen bis zu dieser neueren Datenbank zeichnen.</translation>
     </message>
     <message>
+        <source>Ellipse of the place</source>
+        <translation>Ellipse des Orts</translation>
+    </message>
+    <message>
         <source>Engine of Semantic signatures</source>
         <translation>Engine von Semantische Signaturen</translation>
     </message>
@@ -1058,6 +1062,10 @@
     <message>
         <source>Pitch</source>
         <translation>Neigung</translation>
+    </message>
+    <message>
+        <source>Place</source>
+        <translation>Ort</translation>
     </message>
     <message>
         <source>Popularity of places</source>

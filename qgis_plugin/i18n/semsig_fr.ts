@@ -468,6 +468,10 @@
         <translation>Dessiner les changements jusqu’à cette base plus récente.</translation>
     </message>
     <message>
+        <source>Ellipse of the place</source>
+        <translation>Ellipse du lieu</translation>
+    </message>
+    <message>
         <source>Engine of Semantic signatures</source>
         <translation>Moteur de Signatures sémantiques</translation>
     </message>
@@ -1058,6 +1062,10 @@
     <message>
         <source>Pitch</source>
         <translation>Tangage</translation>
+    </message>
+    <message>
+        <source>Place</source>
+        <translation>Lieu</translation>
     </message>
     <message>
         <source>Popularity of places</source>

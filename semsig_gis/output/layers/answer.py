@@ -191,34 +191,37 @@ def answer_layers(
     if not isinstance(answer, Location):
         return layers
     table = pd.DataFrame([place_row(answer)])
-    layers += [
-        layer(
+    ellipse = [shapely.Polygon(answer.estimate.outline())]
+
+    def place_layer(shapes: Any, *, name: str, level: int, **about: Any) -> Layer:  # noqa: ANN401 - as `layer` takes
+        names = f"""'{name}, answer ' || "answer" """
+        tip = ("chance", "elsewhere", "sigma")
+        return layer(
             gpd.GeoDataFrame(table, geometry=shapes, crs=answer.crs),
             name=name,
-            title=title,
-            description=description,
-            geometry=geometry,
             form=PLACE_FORM,
-            display=Display(
-                level=level,
-                group=GROUP,
-                name=f"""'{name}, answer ' || "answer" """,
-                tip=("chance", "elsewhere", "sigma"),
-            ),
-            styles=(by_answer(geometry=geometry),),
+            display=Display(level=level, group=GROUP, name=names, tip=tip),
+            styles=(by_answer(geometry=about["geometry"]),),
+            **about,
         )
-        for level, name, title, description, geometry, shapes in (
-            (
-                *(8, "place", "Place"),
-                "Where the query was most probably seen from, and how sure that is.",
-                *("point", gpd.points_from_xy(table["x"], table["y"])),
-            ),
-            (
-                *(9, "ellipse", "Ellipse of the place"),
-                "Contains the place with a chance of 90 %, if the answer is right.",
-                *("polygon", [shapely.Polygon(answer.estimate.outline())]),
-            ),
-        )
+
+    layers += [
+        place_layer(
+            gpd.points_from_xy(table["x"], table["y"]),
+            name="place",
+            level=8,
+            title="Place",
+            description="Where the query was most probably seen from, and how sure that is.",
+            geometry="point",
+        ),
+        place_layer(
+            ellipse,
+            name="ellipse",
+            level=9,
+            title="Ellipse of the place",
+            description="Contains the place with a chance of 90 %, if the answer is right.",
+            geometry="polygon",
+        ),
     ]
     if answer.explanations:
         rays = [
