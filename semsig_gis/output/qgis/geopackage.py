@@ -201,6 +201,9 @@ def _read_columns(path: str | Path, layer: str, columns: list[str]) -> pa.Table:
         use_pyarrow=True,
     ) as (metadata, reader):
         table = reader.read_all()
+    # Where geoarrow is imported, geometry has a type of its own, which is stored as binary.
+    kinds = [getattr(kind, "storage_type", kind) for kind in table.schema.types]
+    table = table.cast(pa.schema(zip(table.column_names, kinds, strict=True)))
     return table.rename_columns(
         [GEOMETRY if name == metadata["geometry_name"] else name for name in table.column_names]
     )

@@ -258,7 +258,9 @@ def _read(
             undecoded.append(field)
             texts = [_decoded(value) for value in column.cast("binary").to_pylist()]
             columns[field] = pa.array(texts, pa.string())
-    return list(map(str, batch.column(0).to_pylist())), columns, batch.columns[-1]
+    # Where geoarrow is imported, geometry has a type of its own, which is stored as binary.
+    geometry = getattr(batch.columns[-1], "storage", batch.columns[-1])
+    return list(map(str, batch.column(0).to_pylist())), columns, geometry
 
 
 def _labels(column: pa.Array) -> pa.Array:

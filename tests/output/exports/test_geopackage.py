@@ -56,7 +56,7 @@ from semsig_gis.output import (
     read_geopackage,
     renderer,
 )
-from semsig_gis.sources import paper_taxonomy
+from semsig_gis.sources import LayerSpec, paper_taxonomy, read_layer
 
 if TYPE_CHECKING:
     from semsig_gis.database import CellGeometry
@@ -543,6 +543,18 @@ def test_cells_deleted_and_objects_added_in_qgis_are_read(tmp_path: Path) -> Non
     assert (row["source"], row["source_id"], row["count"]) == ("", "", 1)
     save_objects(contents.objects, tmp_path / "objects.parquet")
     assert len(open_objects(tmp_path / "objects.parquet")) == len(objects) + 1
+
+
+def test_geometry_in_the_type_of_geoarrow_is_read(tmp_path: Path) -> None:
+    types = pytest.importorskip("geoarrow.types.type_pyarrow", reason="geoarrow is not installed")
+    (database, objects), file = small_city(), tmp_path / "city.gpkg"
+    export_database(database, file, objects=objects)
+    with types.registered_extension_types():  # as after `import geoarrow.pyarrow`
+        contents = read_geopackage(file)
+        layer = read_layer(file, LayerSpec(name="objects", class_name="bench", layer="objects"))
+        assert contents.objects is not None
+        save_objects(contents.objects, tmp_path / "objects.parquet")
+    assert len(layer) == len(open_objects(tmp_path / "objects.parquet")) == len(objects)
 
 
 def zero_pages(file: Path, start: int) -> None:
