@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 
 VARIABLE = "SEMSIG_SUPERVISED"
+INTERRUPT_AGAIN_S = 3.0
 
 
 def supervised() -> bool:
@@ -54,10 +55,12 @@ def _interrupt_at_end_of(descriptor: int) -> None:
     # os.read, since a file object would hold its lock when the interpreter ends.
     while os.read(descriptor, 1):
         pass
-    if sys.platform == "win32":
-        signal.raise_signal(signal.SIGINT)
-    else:
-        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    while True:
+        if sys.platform == "win32":
+            signal.raise_signal(signal.SIGINT)
+        else:
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        time.sleep(INTERRUPT_AGAIN_S)  # a library may have ignored the interrupt
 
 
 PATIENCE_S = 2.0  # a progress bar appears only if the work takes longer
