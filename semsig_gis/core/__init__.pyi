@@ -75,6 +75,8 @@ from .parallel import Outcome as Outcome
 from .parallel import check_workers as check_workers
 from .parallel import finish_tasks as finish_tasks
 from .parallel import run_tasks as run_tasks
+from .pictograms import GENERAL_PICTOGRAM as GENERAL_PICTOGRAM
+from .pictograms import PICTOGRAMS as PICTOGRAMS
 from .plugins import CATALOGS as CATALOGS
 from .plugins import COMMANDS as COMMANDS
 from .plugins import EXPORTS as EXPORTS

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.core.pictograms import GENERAL_PICTOGRAM, PICTOGRAMS
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -50,14 +52,19 @@ LINEAR_LIMIT = 0.04045  # sRGB is linear below
 
 @dataclass(frozen=True, slots=True)
 class ClassSign:
-    """Symbol of a class on a map: a letter on one of `SHAPES` in a colour ``#rrggbb``."""
+    """Symbol of a class on a map: a letter on one of `SHAPES` in a colour ``#rrggbb``.
+
+    Where there is room, a pictogram replaces shape and letter: SVG path data in a box of 16 x 16,
+    filled with ``ink`` on a disc of the colour.
+    """
 
     symbol: str
     title: str
     shape: str
     colour: str
+    pictogram: str = field(default=GENERAL_PICTOGRAM, repr=False)
     ink: str = field(init=False, repr=False)
-    """Colour of the letter: black or white, whichever contrasts more with the shape."""
+    """Colour of the letter or pictogram: black or white, whichever contrasts more."""
 
     def __post_init__(self) -> None:  # noqa: D105
         ink = max(BLACK, WHITE, key=lambda ink: _contrast(ink, self.colour))
@@ -90,7 +97,11 @@ def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
     ordered = sorted(taxonomy.classes, key=lambda item: item.code)
     return {
         item.code: ClassSign(
-            item.symbol, item.title, SHAPES[number % len(SHAPES)], COLOURS[number % len(COLOURS)]
+            item.symbol,
+            item.title,
+            SHAPES[number % len(SHAPES)],
+            COLOURS[number % len(COLOURS)],
+            PICTOGRAMS.get(item.name, GENERAL_PICTOGRAM),
         )
         for number, item in enumerate(ordered)
     }
