@@ -71,6 +71,7 @@ from .inputs import number as number
 from .inputs import pairs as pairs
 from .inputs import read_table as read_table
 from .jit import compiled as compiled
+from .links import place_links as place_links
 from .parallel import Outcome as Outcome
 from .parallel import check_workers as check_workers
 from .parallel import finish_tasks as finish_tasks

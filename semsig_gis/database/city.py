@@ -31,6 +31,7 @@ from semsig_gis.database.store import (
     built_digest,
     current_store,
     file_state,
+    names_around,
     open_store,
 )
 from semsig_gis.storage import read_geoparquet, whole_folder, write_geoparquet
@@ -150,6 +151,18 @@ class City(Displayed):
             return self.store.objects
         except DatabaseError:
             return None
+
+    def place_name(self, x: float, y: float) -> str:
+        """Return a place in words (see `ObjectStore.place_name`); empty without a store.
+
+        Of a database in parts, only what is near the place is read.
+        """
+        try:
+            if self.path.is_dir() and "store" not in vars(self):
+                return names_around(self.path, (x, y)).of(x, y)
+            return self.store.place_name(x, y)
+        except DatabaseError:
+            return ""
 
     @property
     def object_counts(self) -> dict[int, int] | None:

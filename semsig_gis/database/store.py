@@ -39,9 +39,11 @@ from semsig_gis.database.file import (
     save_database,
 )
 from semsig_gis.database.occlusion import Footprints, buildings_near
+from semsig_gis.database.place_names import NEAR_M, PlaceNames
 from semsig_gis.database.viewpoints import reproject, select_elements
 from semsig_gis.objects import licenses_of, open_objects, save_objects
 from semsig_gis.storage import (
+    EMPTY_BOX,
     UNREADABLE,
     folder_locked,
     move_folder,
@@ -52,6 +54,8 @@ from semsig_gis.storage import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import geopandas as gpd
     import numpy as np
     import shapely
@@ -122,7 +126,7 @@ class ObjectStore(Displayed):
         lines = select_elements(streets, "streets")
         return cls(
             objects=objects,
-            footprints=None if houses is None else _stored(houses, objects.crs),
+            footprints=None if houses is None else _stored(houses, objects.crs, NAME),
             streets=None if lines is None else _stored(lines, objects.crs, HALF_WIDTH, NAME),
         )
 
@@ -130,6 +134,17 @@ class ObjectStore(Displayed):
     def index(self) -> ObjectIndex:
         """R-tree over the objects, in their order, built at the first access."""
         return ObjectIndex(self.objects.xy)
+
+    @cached_property
+    def _names(self) -> PlaceNames:
+        return PlaceNames(self.streets, self.footprints)
+
+    def place_name(self, x: float, y: float) -> str:
+        """Return a place in words, by the streets and buildings around it; empty without any.
+
+        For example ``on High Street, near Town Hall``. The position is in metres.
+        """
+        return self._names.of(x, y)
 
     def buildings_around(
         self, places: NDArray[np.float64], *, distance: float
@@ -348,16 +363,34 @@ def stored_inputs(folder: Path) -> dict[str, Path]:
 
 
 def _read_inputs(folder: Path) -> ObjectStore:
-    from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it takes 320 ms to load
-
     files = stored_inputs(folder)
     objects = open_objects(files.pop("objects"))
+    houses, lines = _read_ground(files, objects.crs)
+    return ObjectStore.of(objects, footprints=houses, streets=lines)
+
+
+def names_around(folder: Path, xy: tuple[float, float]) -> PlaceNames:
+    """Return the names around a place in metres, from the inputs of a database in parts."""
+    files = stored_inputs(folder)
+    crs = open_objects(files.pop("objects"), box=EMPTY_BOX).crs
+    x, y = xy
+    box = (x - NEAR_M, y - NEAR_M, x + NEAR_M, y + NEAR_M)
+    houses, lines = _read_ground(files, crs, box)
+    return PlaceNames(lines, houses)
+
+
+def _read_ground(
+    files: dict[str, Path], crs: CRS, box: Sequence[float] | None = None
+) -> tuple[gpd.GeoDataFrame | None, gpd.GeoDataFrame | None]:
+    """Return the buildings and the streets in files by role, None without a file."""
+    from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it takes 320 ms to load
+
     roles: tuple[Literal["buildings", "streets"], ...] = ("buildings", "streets")
     houses, lines = (
-        read_surroundings(files[role], role=role, crs=objects.crs) if role in files else None
+        read_surroundings(files[role], role=role, crs=crs, box=box) if role in files else None
         for role in roles
     )
-    return ObjectStore.of(objects, footprints=houses, streets=lines)
+    return houses, lines
 
 
 def _read_shapes(path: Path) -> gpd.GeoDataFrame:

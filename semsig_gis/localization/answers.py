@@ -18,13 +18,14 @@ from semsig_gis.core import (
     InputError,
     SignatureRecord,
     percent,
+    place_links,
     plot_with,
     to_degrees,
 )
 from semsig_gis.observation import GRID_NORTH, NorthRecord, View, ViewRecord
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     import geopandas as gpd
     import pandas as pd
@@ -68,6 +69,15 @@ class PositionRecord(TypedDict):
     read_as: str
 
 
+class BestPlaceRecord(TypedDict):
+    """The best place of an answer: its name in words, in degrees, and links by title."""
+
+    name: str
+    lat: float
+    lon: float
+    links: dict[str, str]
+
+
 class AnswerRecord(TypedDict):
     """The values that the answers of all methods have."""
 
@@ -87,7 +97,8 @@ class Answer(Displayed):
     ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint in `crs`), ``types``
     (symbols), ``length`` (objects) and columns of the method; `candidates` is a table of them.
     `cells` is the number of cells searched. `notes` are sentences on parts of the query that were
-    not used or look wrong. The bearings of `query` are measured from `north`.
+    not used or look wrong. The bearings of `query` are measured from `north`. `place_name` returns
+    the name of a position in `crs`, if the streets are known.
     """
 
     query: Signature
@@ -99,6 +110,23 @@ class Answer(Displayed):
     tied_beyond: int = 0
     notes: tuple[str, ...] = ()
     north: North = GRID_NORTH
+    place_name: Callable[[float, float], str] | None = None
+
+    @property
+    @abstractmethod
+    def xy(self) -> tuple[float, float]:
+        """The best place in metres, in the CRS of the database."""
+
+    @cached_property
+    def place(self) -> str:
+        """The best place in words: ``on High Street, near Town Hall``; empty if unknown."""
+        return "" if self.place_name is None else self.place_name(*self.xy)
+
+    @property
+    def links(self) -> dict[str, str]:
+        """Addresses of public maps and street-level photographs of the best place, by title."""
+        lon, lat = to_degrees(self.crs).transform(*self.xy)
+        return place_links(lat, lon)
 
     @cached_property
     def candidates(self) -> pd.DataFrame:

@@ -153,7 +153,7 @@ class LayerSpec:
     width_field : str, optional
         For streets: the field of the width in metres, which has priority over `width_by`.
     name_field : str, optional
-        For streets: the field of the name.
+        For streets and buildings: the field of the name.
     id_field : str, optional
         Field that identifies a row in its source; by default the number of the feature.
     unique_id : bool
@@ -267,9 +267,13 @@ class LayerSpec:
         names = [name for _, name in by.classes] if by else []
         for name in [self.class_name, *names] if self.class_name else names:
             taxonomy.by_name(name)
-        for key in ("width_by", "width_field", "name_field"):
+        for key in ("width_by", "width_field"):
             if self.role != "streets" and getattr(self, key) is not None:
                 raise CatalogError(f"only streets have {key}; remove it or add its role.")
+        if is_objects and self.name_field is not None:
+            raise CatalogError(
+                "only streets and buildings have name_field; remove it or add its role."
+            )
         if self.unique_id and self.id_field is None:
             raise CatalogError("unique_id needs an id_field; name the field of the ids.")
         if not self.files and self.dataset is None:

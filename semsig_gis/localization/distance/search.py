@@ -14,6 +14,7 @@ from semsig_gis.database import PartitionedDatabase, join_databases, rows_of_res
 from semsig_gis.localization.answers import (
     Answer,
     AnswerRecord,
+    BestPlaceRecord,  # noqa: TC001 - pydantic reads it
     CandidateRecord,
     Ranking,
     candidate_columns,
@@ -26,7 +27,7 @@ from semsig_gis.localization.distance.ties import top_candidates
 from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -52,6 +53,7 @@ class LocalizationRecord(AnswerRecord):
 
     method: str
     used: str
+    place: BestPlaceRecord
     tied_beyond: int
     candidates: list[RankedRecord]
 
@@ -107,6 +109,11 @@ class Localization(Answer):
             "CRS": crs_label(self.crs),
         }
 
+    @property
+    def xy(self) -> tuple[float, float]:
+        """The viewpoint of the first candidate in metres."""
+        return float(self.columns["x"][0]), float(self.columns["y"][0])
+
     def region_cells(self, database: SignatureDatabase, share: float) -> NDArray[np.int64]:  # noqa: ARG002
         """Return the rows of the candidates in the database that was searched."""
         ids, types = self.columns["cell_id"], self.columns["types"]
@@ -119,19 +126,27 @@ class Localization(Answer):
     def to_dict(self) -> LocalizationRecord:
         """Return plain values for JSON; ``candidates`` is a list of records.
 
-        These have the names of `columns` and ``lon``, ``lat`` (degrees, WGS 84).
+        These have the names of `columns` and ``lon``, ``lat`` (degrees, WGS 84). ``place`` is the
+        first of them, with its name in words and links.
         """
+        candidates = self.candidate_rows()
         return {
             "query": self.query.to_dict(self.taxonomy),
             "north": self.north.to_dict(),
             "method": str(self.method),
             "used": self.used,
+            "place": {
+                "name": self.place,
+                "lat": candidates[0]["lat"],
+                "lon": candidates[0]["lon"],
+                "links": self.links,
+            },
             "cells": self.cells,
             "tied_beyond": self.tied_beyond,
             "notes": list(self.notes),
             "crs": self.crs.to_string(),
             "licenses": list(self.licenses),
-            "candidates": self.candidate_rows(),
+            "candidates": candidates,
         }
 
 
@@ -144,6 +159,7 @@ class DistanceLocator:
     requirement: Requirement | None = None
     top: int = 100
     north: North = GRID_NORTH
+    place_name: Callable[[float, float], str] | None = None
     _warm_parts: set[str] = field(default_factory=set)  # `rankings` has compared them before
 
     def __post_init__(self) -> None:  # noqa: D105
@@ -180,6 +196,7 @@ class DistanceLocator:
                 *self.north.notes,
             ),
             north=self.north,
+            place_name=self.place_name,
         )
 
     def _search(self, query: Signature, top: int) -> tuple[Shortlist, SignatureDatabase]:

@@ -48,7 +48,7 @@ from semsig_gis.localization.noise.model import cell_noise, place_noise
 from semsig_gis.observation import GRID_NORTH
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -202,6 +202,11 @@ class Location(Answer):
         return int(cell_ids(*self.posterior.database.grid.cells_at(estimate))[0])
 
     @property
+    def xy(self) -> tuple[float, float]:
+        """The estimated place in metres."""
+        return self.estimate.x, self.estimate.y
+
+    @property
     def degrees(self) -> tuple[float, float]:
         """Longitude and latitude of the estimated place, rounded to 1 cm."""
         lon, lat = to_degrees(self.crs).transform(self.estimate.x, self.estimate.y)
@@ -228,13 +233,13 @@ class Location(Answer):
     def to_dict(self) -> LocationRecord:
         """Return everything except the chances of all cells as plain values for JSON.
 
-        ``place`` has the keys of `PlaceEstimate.to_dict` and ``cell_id``, ``lon``, ``lat``,
-        ``chance`` and ``within_m``. ``threshold`` is None if no chance is enough. The ``places`` of
-        the ``region`` are None if there are over 100. ``doubt`` may be empty; ``doubt_parts`` are
-        the numbers in it (see `DoubtRecord`). ``candidates`` have the
-        keys of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, for the first of them,
-        ``explanation``, with bearings from ``north`` like those of the query. ``prior`` has the
-        keys of `known` and ``ratio``; it is None without a prior.
+        ``place`` has the keys of `PlaceEstimate.to_dict` and ``name`` (in words), ``links`` (see
+        `place_links`), ``cell_id``, ``lon``, ``lat``, ``chance`` and ``within_m``. ``threshold``
+        is None if no chance is enough. The ``places`` of the ``region`` are None if there are over
+        100. ``doubt`` may be empty; ``doubt_parts`` are the numbers in it (see `DoubtRecord`).
+        ``candidates`` have the keys of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, for the
+        first of them, ``explanation``, with bearings from ``north`` like those of the query.
+        ``prior`` has the keys of `known` and ``ratio``; it is None without a prior.
         """
         lon, lat = self.degrees
         candidates = self.candidate_rows()
@@ -249,12 +254,14 @@ class Location(Answer):
             "cells": self.cells,
             "answered": self.answer.given,
             "place": {
+                "name": self.place,
                 "cell_id": self.cell_id,
                 **self.estimate.to_dict(),
                 "lon": lon,
                 "lat": lat,
                 "chance": self.answer.mass,
                 "within_m": self.rule.radius,
+                "links": self.links,
             },
             "threshold": threshold if math.isfinite(threshold) else None,
             "elsewhere": self.elsewhere,
@@ -299,6 +306,7 @@ class LikelihoodLocator:
     quick: bool = False
     incremental: IncrementalIndex | None = None
     surely_here: bool = False
+    place_name: Callable[[float, float], str] | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -500,6 +508,7 @@ class LikelihoodLocator:
             known=self.known,
             prior_ratio=ratio,
             north=self.north,
+            place_name=self.place_name or (self.store and self.store.place_name),
         )
         return location.doubted(elsewhere, fit)
 
@@ -563,6 +572,7 @@ class LocateOptions(TypedDict, total=False):
     known: Mapping[str, Any]
     north: North
     surely_here: bool
+    place_name: Callable[[float, float], str] | None
 
 
 def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOptions]) -> Location:
@@ -587,7 +597,8 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         prior in the answer, in plain values. The ``north`` is the direction from which bearings
         count, grid north by default. ``surely_here`` is whether views are surely from the area of
         the database; otherwise they are from elsewhere with a chance of 0.5 before their objects
-        are compared (see `likelihood.elsewhere`).
+        are compared (see `likelihood.elsewhere`). ``place_name`` returns the name of a position in
+        metres; by default it is that of the store.
 
     Returns
     -------

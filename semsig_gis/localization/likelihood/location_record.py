@@ -8,6 +8,7 @@ from typing_extensions import TypedDict
 
 from semsig_gis.localization.answers import (
     AnswerRecord,
+    BestPlaceRecord,
     CandidateRecord,
     DoubtRecord,  # noqa: TC001 - pydantic reads it
     PositionRecord,
@@ -16,12 +17,10 @@ from semsig_gis.localization.likelihood.estimate import EstimateRecord
 from semsig_gis.localization.likelihood.explain import ExplanationRecord  # noqa: TC001 - pydantic reads it
 
 
-class PlaceRecord(EstimateRecord):
-    """The place of an answer, in metres and in degrees, with its chance."""
+class PlaceRecord(EstimateRecord, BestPlaceRecord):
+    """The place of an answer in words, in metres and in degrees, with links and its chance."""
 
     cell_id: int
-    lon: float
-    lat: float
     chance: float
     within_m: float
 

@@ -57,8 +57,8 @@ def write_answer_geojson(layers: Sequence[Layer], path: str | Path) -> None:
 def write_answer_kml(layers: Sequence[Layer], path: str | Path) -> None:
     """Write the layers of an answer as one KML 2.2, atomically.
 
-    Each layer is a folder, in the colours of the maps. The description holds the licences. The
-    file refers to no server.
+    Each layer is a folder, in the colours of the maps. The description holds the licences.
+    Addresses are plain text, so nothing is requested.
     """
     root = ET.Element("kml", xmlns=KML)
     document = ET.SubElement(root, "Document")

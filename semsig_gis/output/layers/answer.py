@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core import VERDICTS
+from semsig_gis.core import VERDICTS, place_links
 from semsig_gis.database import CellTable
 from semsig_gis.localization import UNKNOWN_NAME, Location
 from semsig_gis.output.layers.columns import form_of
@@ -18,7 +18,7 @@ from semsig_gis.output.layers.model import Display, table_layer
 from semsig_gis.output.layers.styles import Style, StyleClass, Symbol, by_answer, by_rank
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization import Answer, Explanation, SearchRegions
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 PLACE_FORM = form_of("""
 [Place]
+address = ["Place", "In words, by the streets and buildings around it."]
 answer = ["Answer", "Given, or withheld where the chance is too small."]
 chance = ["Chance", "Of the place being right, from 0 to 1.", "1", 2]
 elsewhere = ["Chance of elsewhere", "Of the view not being from the area of the cells, from 0 to 1.", "1", 2]
@@ -43,9 +44,16 @@ heading = ["Heading", "What is added to the bearings of the query to have them f
 heading_sigma = ["Standard deviation of the heading", "Of the heading.", "°", 1]
 cell_id = ["Cell", "Number of the cell in the grid."]
 refined = ["Off the grid", "Whether the place was looked for between the viewpoints, too."]
+[Links]
+openstreetmap = ["OpenStreetMap", "Address of a map of the place."]
+google_street_view = ["Google Street View", "Address of photographs near the place."]
+mapillary = ["Mapillary", "Address of photographs near the place."]
+panoramax = ["Panoramax", "Address of photographs near the place."]
+kartaview = ["KartaView", "Address of photographs near the place."]
 """)  # noqa: E501
 CANDIDATE_FORM = form_of("""
 [Place]
+address = ["Place", "In words, by the streets and buildings around it."]
 rank = ["Rank", "1 is the best place for the query."]
 rank_low = ["Rank from", "First rank that ties allow; 1 is the best."]
 rank_high = ["Rank to", "Last rank that ties allow."]
@@ -64,6 +72,12 @@ length = ["Objects seen", "How many street objects are seen from the cell."]
 types = ["Types", "Symbols of the objects, clockwise from north."]
 bearings = ["Bearings", "Of the same objects, clockwise from grid north.", "°"]
 distances = ["Distances", "Of the same objects.", "m"]
+[Links]
+openstreetmap = ["OpenStreetMap", "Address of a map of the place."]
+google_street_view = ["Google Street View", "Address of photographs near the place."]
+mapillary = ["Mapillary", "Address of photographs near the place."]
+panoramax = ["Panoramax", "Address of photographs near the place."]
+kartaview = ["KartaView", "Address of photographs near the place."]
 """)  # noqa: E501
 REGION_FORM = form_of("""
 [Region]
@@ -142,7 +156,13 @@ def answer_layers(
     candidates = answer.to_geodataframe()
     cells = CellTable(database.select(candidates["cell"].to_numpy()))
     columns = cells.columns(slice(0, len(candidates)))
-    candidates = candidates.assign(bearings=columns["bearings"], distances=columns["distances"])
+    viewpoints = zip(candidates["x"].tolist(), candidates["y"].tolist(), strict=True)
+    candidates = candidates.assign(
+        bearings=columns["bearings"],
+        distances=columns["distances"],
+        address=[answer.place_name(*xy) if answer.place_name else "" for xy in viewpoints],
+        **link_columns([place_links(row["lat"], row["lon"]) for row in answer.candidate_rows()]),
+    )
     values: Mapping[str, Any] = answer.to_dict()
     licenses = tuple(values["licenses"])
     facts = {name: values[name] for name in values if name not in {"candidates", "crs", "licenses"}}
@@ -190,7 +210,7 @@ def answer_layers(
     ]
     if not isinstance(answer, Location):
         return layers
-    table = pd.DataFrame([place_row(answer)])
+    table = pd.DataFrame([place_row(answer)]).assign(**link_columns([answer.links]))
     ellipse = [shapely.Polygon(answer.estimate.outline())]
 
     def place_layer(shapes: Any, *, name: str, level: int, **about: Any) -> Layer:  # noqa: ANN401 - as `layer` takes
@@ -251,6 +271,14 @@ def answer_layers(
     return layers
 
 
+def link_columns(links: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
+    """Return the links of places as columns of a layer."""
+    return {
+        title.lower().replace(" ", "_"): [of_place[title] for of_place in links]
+        for title in links[0]
+    }
+
+
 def explanation_rows(location: Location, explanation: Explanation) -> list[dict[str, Any]]:
     """Return the objects of the query and of the map at a candidate, with ends of lines in metres.
 
@@ -290,8 +318,10 @@ def place_row(location: Location) -> dict[str, Any]:
     """Return the columns of the place of an answer by likelihood; missing numbers are NaN."""
     facts = location.to_dict()
     place: dict[str, Any] = {**facts["place"]}
-    ellipse, _ = place.pop("ellipse_90"), place.pop("covariance")
+    ellipse = place.pop("ellipse_90")
+    del place["covariance"], place["links"]
     row = {
+        "address": place.pop("name"),
         "answer": "given" if facts["answered"] else "withheld",
         **place,
         "longer_m": ellipse["longer"],
