@@ -147,7 +147,7 @@ def length(least: int, most: int | None = None) -> Any:  # noqa: ANN401 - pydant
     return Field(min_length=least, max_length=most)
 
 
-Text = Annotated[str, length(1)]
+Text = Annotated[str, length(1), Accepts("a text that is not empty")]
 Texts = Annotated[tuple[Text, ...], Accepts("a list of texts that are not empty")]
 
 

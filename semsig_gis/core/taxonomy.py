@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import asdict, dataclass, replace
+import itertools
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -28,6 +29,8 @@ MAX_HEIGHT_M = 500.0
 class ObjectClass:
     """A class of street objects.
 
+    Classes are equal if they differ only in their titles, because each city may have its own.
+
     Parameters
     ----------
     code : int
@@ -37,7 +40,7 @@ class ObjectClass:
     name : str
         Lower-case identifier such as ``street_light``.
     title : str
-        Name in reports and legends.
+        Name for people, in answers, reports and legends.
     range_m : float, optional
         Distance from which an object of the class is visible, in metres; None for the default.
     height_m, height_sigma : float, optional
@@ -59,7 +62,7 @@ class ObjectClass:
     code: Annotated[int, number("a whole number from 1 to 255", 1, MAX_CODE, whole=True)]
     symbol: Annotated[str, matching("[A-Za-z0-9]", "one ASCII letter or digit")]
     name: Annotated[str, matching("[a-z][a-z0-9_]*", "lower-case letters, digits and underscores")]
-    title: str
+    title: str = field(compare=False)
     range_m: Annotated[float, metres(MAX_RANGE_M)] | None = None
     height_m: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
     height_sigma: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
@@ -104,6 +107,8 @@ class Taxonomy(Displayed):
     [3, 3]
     >>> lights.decode([3, 3])
     'DD'
+    >>> lights.words([3, 3])
+    '2 × street light'
     """
 
     classes: tuple[ObjectClass, ...]
@@ -145,11 +150,18 @@ class Taxonomy(Displayed):
 
         The other classes keep their range.
         """
-        for name in ranges:
+        return self._with("range_m", {name: float(metres) for name, metres in ranges.items()})
+
+    def with_titles(self, titles: Mapping[str, str]) -> Taxonomy:
+        """Return a taxonomy with the titles of some classes, by name, replaced."""
+        return self._with("title", titles)
+
+    def _with(self, attribute: str, values: Mapping[str, object]) -> Taxonomy:
+        for name in values:
             self.by_name(name)
         return Taxonomy(
             tuple(
-                replace(item, range_m=float(ranges[item.name])) if item.name in ranges else item
+                replace(item, **{attribute: values.get(item.name, getattr(item, attribute))})
                 for item in self.classes
             )
         )
@@ -198,6 +210,24 @@ class Taxonomy(Displayed):
     def decode(self, codes: ArrayLike) -> str:
         """Return the symbols of class codes, shape (n,), the inverse of `encode`."""
         return self.symbol_bytes[np.asarray(codes, dtype=np.uint8)].tobytes().decode("ascii")
+
+    def words(self, codes: ArrayLike) -> str:
+        """Return the titles of class codes, shape (n,), for people.
+
+        They are in lower case and in the order of the codes, with equal neighbours counted.
+
+        >>> from semsig_gis import paper_taxonomy
+        >>> paper_taxonomy().words([11, 5, 5, 0])
+        'bus stop, 2 × traffic light, something'
+        >>> paper_taxonomy().words([])
+        'nothing'
+        """
+        parts = []
+        for code, group in itertools.groupby(np.asarray(codes, dtype=np.uint8).tolist()):
+            title = "something" if code == WILDCARD else self.by_code(code).title.lower()
+            count = len([*group])
+            parts.append(title if count == 1 else f"{count} × {title}")
+        return ", ".join(parts) or "nothing"
 
     @functools.cached_property
     def symbol_bytes(self) -> NDArray[np.uint8]:

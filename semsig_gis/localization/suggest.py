@@ -63,7 +63,7 @@ class ClassQuestion:
     >>> index = build_index(demo_database, named_noise("generic"))
     >>> first = next_questions(index, locate(index, demo_database.signature(0)))[0]
     >>> first.text
-    'Is there a public bench within 30 m?'
+    'Is there a bench within 30 m?'
     """
 
     item: ObjectClass

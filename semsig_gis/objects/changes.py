@@ -257,7 +257,7 @@ def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
     new_classes = {item.code: item for item in new.classes}
     for item in old.classes:
         other = new_classes.get(item.code)
-        if other is not None and replace(other, title=item.title) != item:
+        if other is not None and other != item:
             raise InputError(
                 f"class code {item.code} means {_brief(item)} before and {_brief(other)} after; "
                 "load both with the same catalogue, or build the database again."

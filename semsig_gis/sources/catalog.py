@@ -18,6 +18,7 @@ from semsig_gis.core import (
     InputError,
     ObjectClass,
     Taxonomy,
+    Text,
     Texts,  # noqa: TC001 - of fields
     UnknownNameError,
     file_key,
@@ -58,6 +59,8 @@ class CatalogFile(FileTable):
         What leaves a row out of every layer of objects that has no ``not``.
     ranges : mapping of str to float
         Distances in metres from which classes are visible.
+    titles : mapping of str to str
+        Titles of the paper's classes that fit the data better than the usual ones.
     classes : tuple of ObjectClass
         Classes that the paper does not have.
     """
@@ -77,6 +80,7 @@ class CatalogFile(FileTable):
     exclusions: Annotated[Conditions, file_key("not")] = ()
     conflate: Annotated[_ByClass, pairs(Annotated[float, metres(MAX_MERGING_M)])] = ()
     ranges: Annotated[_ByClass, pairs(Annotated[float, metres(MAX_RANGE_M)])] = ()
+    titles: Annotated[tuple[tuple[str, str], ...], pairs(Text)] = ()
     classes: tuple[ObjectClass, ...] = ()
     layers: Annotated[tuple[LayerSpec, ...], length(1)]
 
@@ -272,8 +276,8 @@ def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
     -------
     Catalog
         With several, the name of a layer begins with the name of its catalogue. Metric CRS,
-        merging radii, and range and height of a class come from the first catalogue that gives
-        them. CatalogError if one name, code or symbol means different classes.
+        merging radii, and title, range and height of a class come from the first catalogue that
+        gives them. CatalogError if one name, code or symbol means different classes.
 
     Examples
     --------
@@ -288,7 +292,7 @@ def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
     if len(catalogs) == 1:
         return catalogs[0]
     classes = [item for catalog in catalogs for item in catalog.taxonomy.classes]
-    # Classes that differ only in range or height are the same class.
+    # Classes that differ only in title, range or height are the same class.
     measures: dict[ObjectClass, dict[str, Any]] = {}
     for item in classes:
         kind = dataclasses.replace(item, range_m=None, height_m=None, height_sigma=None)
@@ -336,7 +340,10 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     file = read_table(CatalogFile, _with_inherited(content), where)
     place = where
     try:
-        taxonomy = paper_taxonomy().extended(file.classes)
+        place = f"{where}, titles"
+        taxonomy = paper_taxonomy().with_titles(dict(file.titles))
+        place = where
+        taxonomy = taxonomy.extended(file.classes)
         if file.metric_crs is not None:
             require_metric_crs(file.metric_crs)
         place = f"{where}, conflate"

@@ -153,7 +153,8 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
     text = word.strip()
     if len(text) == 1:
         return int(taxonomy.encode(text)[0])
-    class_words = _class_words(taxonomy)
+    # Equal taxonomies may have different titles.
+    class_words = _class_words(tuple((c.code, c.name, c.title) for c in taxonomy.classes))
     code: int | None
     if "=" in text:
         key, _, value = (part.strip() for part in text.partition("="))
@@ -184,21 +185,24 @@ def _content() -> dict[str, Any]:
 
 
 @functools.lru_cache(maxsize=8)
-def _class_words(taxonomy: Taxonomy) -> Mapping[str, tuple[int, str]]:
-    """Return class code and original word by normalized word (lower case, no blanks)."""
+def _class_words(classes: tuple[tuple[int, str, str], ...]) -> Mapping[str, tuple[int, str]]:
+    """Return class code and original word by normalized word (lower case, no blanks).
+
+    `classes` are codes, names and titles.
+    """
     lists = _content()["classes"]
     others = [
-        (key, item.code, word)
-        for item in taxonomy.classes
-        for key, words in lists.get(item.name, {}).items()
+        (key, code, word)
+        for code, name, _ in classes
+        for key, words in lists.get(name, {}).items()
         if key != "fields"
         for word in words
     ]
     # English has priority over the other languages.
     others.sort(key=lambda item: item[0] not in {"en", SPOKEN})
     pairs = [
-        *((item.code, item.name.replace("_", " ")) for item in taxonomy.classes),
-        *((item.code, item.title) for item in taxonomy.classes),
+        *((code, name.replace("_", " ")) for code, name, _ in classes),
+        *((code, title) for code, _, title in classes),
         (WILDCARD, "unknown"),
         *((code, word) for _, code, word in others),
     ]

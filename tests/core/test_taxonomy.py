@@ -84,6 +84,20 @@ def test_height_needs_a_deviation(height: float | None, sigma: float | None) -> 
     assert Taxonomy.from_list(tall.to_list()) == tall
 
 
+def test_titles_do_not_distinguish_taxonomies() -> None:
+    titled = TAXONOMY.with_titles({"alignment_tree": "Baum"})
+    assert titled == TAXONOMY
+    assert [item["title"] for item in titled.to_list()] == ["Baum", "Street light"]
+    assert Taxonomy.from_list(titled.to_list()).words([1, 1, 3, 0]) == (
+        "2 × baum, street light, something"
+    )
+    assert titled.words([]) == "nothing"
+    with refused(UnknownNameError, "code 7"):
+        titled.words([7])
+    with refused(UnknownNameError, "'street_ligth'", "nearest is 'street_light'"):
+        TAXONOMY.with_titles({"street_ligth": "Lampe"})
+
+
 @pytest.mark.parametrize("attribute", ["code", "symbol", "name"])
 def test_duplicate_code_symbol_or_name_is_refused(attribute: str) -> None:
     value = getattr(TREE, attribute)

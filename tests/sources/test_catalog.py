@@ -95,6 +95,18 @@ def test_taxonomy_has_the_ranges_of_the_catalogue(town: Town) -> None:
     assert (ranges[11], ranges[30], ranges[3]) == (50.0, 12.5, 30.0)
 
 
+def test_classes_have_the_titles_of_the_catalogue(town: Town) -> None:
+    text = 'title = "T"\ntitles = { bus_stop = "Halt" }'
+    ours = load_catalog(town('title = "Town open data"', text))
+    assert ours.taxonomy.words([11, 30, 1]) == "halt, kiosk, tree"
+    openstreetmap = load_catalog("openstreetmap").taxonomy
+    assert openstreetmap.words([1, 7, 4, 12]) == "tree, toilets, sign, crossing"
+    montpellier = load_catalog("montpellier")
+    both = combine_catalogs([ours, montpellier]).taxonomy
+    assert both.words([11, 12]) == "halt, pedestrian crossing"
+    assert combine_catalogs([montpellier, ours]).taxonomy.words([11]) == "bus stop"
+
+
 def test_taxonomy_has_the_heights_of_the_catalogue(town: Town) -> None:
     text = 'title = "Kiosk"\nheight_m = 3\nheight_sigma = 0.5'
     kiosk = load_catalog(town('title = "Kiosk"', text)).taxonomy.by_name("kiosk")

@@ -12,7 +12,7 @@ TAXONOMY = load_catalog("openstreetmap").taxonomy
 WORDS = {
     "street_light": "D, street_light, Street light, lamp, Street Lamps, lamp-post, lampadaire, "
     "highway=street_lamp, highway = street_lamp",
-    "bench": "L, Public bench, benches, the bench, banc, amenity=bench",
+    "bench": "L, Bench, Public bench, benches, the bench, banc, amenity=bench",
     "alignment_tree": "B, tree, trees, Baum, natural=tree",
     "bus_stop": "M, bus-stop, BusStop, bus stops, highway=bus_stop",
     "indicator": "sign, traffic signs, traffic_sign=maxspeed",
@@ -48,7 +48,7 @@ def test_names_of_the_taxonomy_have_priority() -> None:
     ("word", "message"),
     [
         ("lampe", "the nearest is 'lamp'"),
-        ("treehouse", "B alignment tree"),
+        ("treehouse", "B tree"),
         ("fire hydrant", "'fire hydrant' is unknown"),
         ("highway=crossing", "D street light"),
         ("", "give a word"),

@@ -21,6 +21,20 @@ OCCURRENCES: Mapping[str, int] = {
     "bench": 135_748,
     "bus_stop": 32_320,
 }
+# Its names of the classes.
+TITLES: Mapping[str, str] = {
+    "alignment_tree": "Alignment tree",
+    "water_fountain": "Water fountain",
+    "street_light": "Street light",
+    "indicator": "Indicator",
+    "traffic_light": "Traffic light",
+    "bike_station": "Bike station",
+    "automatic_wc": "Automatic WC",
+    "car_station": "Car station",
+    "taxi_station": "Taxi station",
+    "bench": "Public bench",
+    "bus_stop": "Bus stop",
+}
 DATABASE: Mapping[str, float] = {
     "radius_m": 30.0,
     "signatures": 312_134,

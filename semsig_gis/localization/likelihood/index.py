@@ -502,8 +502,12 @@ def build_index(database: SignatureDatabase, noise: Noise) -> LikelihoodIndex:
 
 
 def index_fingerprint(database: SignatureDatabase, noise: Noise) -> str:
-    """Return 32 hexadecimal digits that change with the database, the noise model and `VERSION`."""
-    specs = json.dumps([VERSION, noise.to_dict(), database.taxonomy.to_list(), database.reach])
+    """Return 32 hexadecimal digits that change with the database, the noise model and `VERSION`.
+
+    Titles of classes do not change them.
+    """
+    classes = [item | {"title": ""} for item in database.taxonomy.to_list()]
+    specs = json.dumps([VERSION, noise.to_dict(), classes, database.reach])
     digest = hashlib.blake2b(specs.encode(), digest_size=16)
     for array in (
         database.columns,

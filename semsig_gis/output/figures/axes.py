@@ -203,7 +203,7 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
     --------
     >>> ax = plot_objects(demo_objects)
     >>> ax.figure.legends[0].get_texts()[0].get_text()
-    'B Alignment tree (120)'
+    'B Tree (120)'
     """
     if not len(objects):
         raise EmptyResultError("there is no street object to show; look at what was loaded.")

@@ -238,7 +238,7 @@ def draw_scene(scene: Scene) -> Picture:
     Examples
     --------
     >>> draw_scene(cell_scene(demo_database, 0, title="A corner")).description
-    'A corner. Signature DB, seen from 2.997619, 48.751799: alignment tree (1), street light (1).'
+    'A corner. Signature DB, seen from 2.997619, 48.751799: tree (1), street light (1).'
     """
     return draw_scenes([scene])
 

@@ -168,7 +168,8 @@ def _object_section(results: Reproduction) -> Section:
     total = sum(paris.OCCURRENCES.values())
     numbers = []
     for item in results.summary["occurrences"]:
-        row, paper = item["title"], paris.OCCURRENCES.get(item["name"])
+        row = paris.TITLES.get(item["name"], item["title"])
+        paper = paris.OCCURRENCES.get(item["name"])
         share = None if paper is None else paper / total
         numbers += [
             Number(row, "occurrences", item["number"], paper=paper, decimals=0),
