@@ -13,7 +13,15 @@ from typer.core import TyperCommand, TyperGroup
 
 import semsig_gis.cli.serve  # noqa: F401 - its command needs a package above `commands`
 from semsig_gis import __version__
-from semsig_gis.cli.console import REPORTER, print_json, print_table, remark, say, talk
+from semsig_gis.cli.console import (
+    REPORTER,
+    print_json,
+    print_table,
+    remark,
+    say,
+    say_sentence,
+    talk,
+)
 from semsig_gis.commands import (
     GROUPS,
     Command,
@@ -49,11 +57,18 @@ HELP_ALL = typer.Option(
 class Printing:
     """Options of the command line that are not fields of a request."""
 
-    json: Annotated[bool, Option("Print JSON instead of tables.")] = False
+    json: Annotated[bool, Option("Print JSON for other programs.")] = False
     quiet: Annotated[
-        bool, Option("Print results only, without progress and remarks.", short="-q")
+        bool,
+        Option(
+            "Print only the paths of the written files, or only the result if there are none.",
+            short="-q",
+        ),
     ] = False
-    verbose: Annotated[bool, Option("Report each step and how long it took.", short="-v")] = False
+    tables: Annotated[bool, Option("Print tables with the details as well.")] = False
+    verbose: Annotated[
+        bool, Option("Print the tables, and report each step and how long it took.", short="-v")
+    ] = False
 
 
 def printing_of(command: Command) -> list[Field]:
@@ -157,11 +172,12 @@ def _typer_command(command: Command) -> Any:  # noqa: ANN401 - of typer
     def run(**values: Any) -> None:  # noqa: ANN401 - any fields
         values.pop("help_all", None)  # its callback prints
         printing = Printing(**{field.name: values.pop(field.name) for field in shared})
-        if printing.quiet and printing.verbose:
-            raise InputError("--quiet and --verbose were given; give one of them.")
+        for name in ("verbose", "tables"):
+            if printing.quiet and getattr(printing, name):
+                raise InputError(f"--quiet and --{name} were given; give one of them.")
         before = talk.set("quiet" if printing.quiet else "verbose" if printing.verbose else "plain")
         try:
-            show(run_command(command.request(**values), REPORTER), as_json=printing.json)
+            show(run_command(command.request(**values), REPORTER), printing)
         finally:
             talk.reset(before)
 
@@ -216,21 +232,34 @@ def _parameter(field: Field) -> inspect.Parameter:
     )
 
 
-def show(result: Result, *, as_json: bool) -> None:
+def show(result: Result, printing: Printing) -> None:
     """Print a result on standard output, as JSON or as text, and its notes."""
-    if result.values is None or (result.text is not None and not as_json):
-        for part in result.text or ():
-            if isinstance(part, str):
-                say(part)
-            else:
+    as_text = result.values is None or (result.summary is not None and not printing.json)
+    if not as_text:
+        _print_values(result)
+    elif not (printing.quiet and result.files):
+        details = result.tables if printing.tables or printing.verbose else ()
+        for part in (*(result.summary or ()), *details):
+            if not isinstance(part, str):
                 print_table(part)
-    elif result.stream:
-        for value in result.values():
-            print_json(value, indent=None)
-    else:
-        print_json(result.values())
+            elif result.values is None:
+                say(part)  # a text for a file
+            else:
+                say_sentence(part)
     for note in result.notes:
         remark(note)
+    if as_text:
+        for what, path in result.files.items():
+            say(path if printing.quiet else f"{what}: {path}")
+
+
+def _print_values(result: Result) -> None:
+    """Print the values of a result as JSON, or as a line of it for each of them."""
+    if result.values is not None and result.stream:
+        for value in result.values():
+            print_json(value, indent=None)
+    elif result.values is not None:
+        print_json(result.values())
 
 
 def run() -> int:

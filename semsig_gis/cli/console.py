@@ -7,11 +7,14 @@ import functools
 import json
 import os
 import re
+import shutil
 import signal
 import sys
+import textwrap
 import threading
 import time
 from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import typer
@@ -68,15 +71,29 @@ PATIENCE_S = 2.0  # a progress bar appears only if the work takes longer
 _AMOUNT = r"[-+±]?(?:\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?|infinite)(?: ?(?:°|%|m|km|km²|m²|MB|s|ms))?"
 NUMBER = re.compile(rf"{_AMOUNT}(?:(?:-| to ){_AMOUNT})?")
 """A number in a table with its unit, or the two ends of an interval."""
+WIDEST_WORD = 30  # longer words in a column, such as addresses, may be broken
 
 
-def say(text: object, *, err: bool = False, end: str = "\n") -> None:
+def say(text: object, *, err: bool = False) -> None:
     """Print text on standard output or standard error, with escape sequences made visible.
 
     Names and messages from files may contain them (see `visible`).
     """
-    shown = visible_lines([str(text)])[0] + end
-    typer.echo(shown, err=err, nl=False)  # noqa: TID251 - the only place
+    typer.echo(visible_lines([str(text)])[0], err=err)  # noqa: TID251 - the only place
+
+
+PIPED_WIDTH = 120  # columns of a pipe or a file
+
+
+def say_sentence(text: str) -> None:
+    """Print a sentence on standard output, in lines as wide as the terminal."""
+    for line in visible_lines([text])[0].split("\n"):
+        say(_wrapped(line, shutil.get_terminal_size((PIPED_WIDTH, 0)).columns))
+
+
+def _wrapped(line: str, width: int) -> str:
+    """Return a line with breaks between words."""
+    return textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False)
 
 
 Talk = Literal["quiet", "plain", "verbose"]
@@ -92,7 +109,10 @@ def remark(text: str) -> None:
 
 def complain(text: str) -> None:
     """Print a sentence on standard error in any case: why the command ends."""
-    say(f"semsig: {visible(text)}", err=True)
+    sentence = f"semsig: {visible(text)}"
+    if sys.stderr is not None and sys.stderr.isatty():  # programs read lines
+        sentence = _wrapped(sentence, os.get_terminal_size(sys.stderr.fileno()).columns)
+    say(sentence, err=True)
 
 
 def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 - any JSON
@@ -109,34 +129,93 @@ def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 -
     say(text)
 
 
+@dataclass
+class _Column:
+    """A column of a table, with the width that it gets and the least one."""
+
+    name: str
+    texts: list[str]
+    numeric: bool
+    width: int
+    least: int
+
+    @classmethod
+    def of(cls, name: str, texts: list[str]) -> _Column:
+        """Return a column as wide as its texts."""
+        from rich.cells import cell_len
+
+        filled = [text for text in texts if text]
+        numeric = bool(filled) and all(map(NUMBER.fullmatch, filled))
+        lines = [] if numeric else filled  # may be broken between words
+        words = [word for text in (name, *lines) for word in text.split()]
+        longest = max(map(cell_len, words), default=0)
+        content = max(map(cell_len, filled), default=0)
+        return cls(
+            name=name,
+            texts=texts,
+            numeric=numeric,
+            width=max(cell_len(name), content),
+            least=max(longest, content) if numeric else min(longest, WIDEST_WORD),
+        )
+
+
+def _fit(columns: list[_Column], width: int, *, minor: tuple[str, ...]) -> list[_Column]:
+    """Return the columns that fit into a width, made as narrow as necessary.
+
+    All minor ones are left out first, then the last ones; two stay.
+    """
+    room = width - 1  # a column has two spaces and a line in addition to its width
+
+    def fits(some: list[_Column]) -> bool:
+        return len(some) <= 2 or sum(item.least + 3 for item in some) <= room  # noqa: PLR2004
+
+    kept = list(columns)
+    if not fits(kept):
+        kept = [column for column in kept if column.name not in minor]
+    while not fits(kept):
+        kept.pop()
+    while (excess := sum(item.width + 3 for item in kept) - room) > 0:
+        wide = [item for item in kept if item.width > item.least]
+        if not wide:
+            break
+        widest = max(wide, key=lambda item: item.width)
+        others = [item.width for item in wide if item.width < widest.width]
+        target = max([widest.least, widest.width - excess, *others])
+        widest.width = target if target < widest.width else widest.width - 1
+    return kept
+
+
 def print_table(table: Table) -> None:
     """Print a table with its note; markup and escape sequences in it have no effect.
 
-    Columns with only numbers are right-aligned.
+    Columns with only numbers are right-aligned and never folded. If the terminal is too narrow,
+    columns are left out, and named below the table.
     """
     from rich import table as parts
     from rich.console import Console
     from rich.text import Text
 
-    grid = parts.Table(title=Text(visible(table.title)), title_justify="left")
+    width = shutil.get_terminal_size((PIPED_WIDTH, 0)).columns
     # Escape all cells in one call, which is faster.
     shown = iter(visible_lines(text for row in table.rows for text in row))
     texts = [[next(shown) for _ in row] for row in table.rows]
-    for number, name in enumerate(table.columns):
-        column = [row[number] for row in texts if number < len(row) and row[number]]
-        right = bool(column) and all(map(NUMBER.fullmatch, column))
-        grid.add_column(Text(visible(name)), overflow="fold", justify="right" if right else "left")
-    for row in texts:
+    columns = [
+        _Column.of(visible(name), [row[number] for row in texts])
+        for number, name in enumerate(table.columns)
+    ]
+    kept = _fit(columns, width, minor=table.minor)
+    grid = parts.Table()
+    for column in kept:
+        justify: Literal["left", "right"] = "right" if column.numeric else "left"
+        grid.add_column(Text(column.name), overflow="fold", justify=justify, width=column.width)
+    for row in zip(*(column.texts for column in kept), strict=True):
         grid.add_row(*map(Text, row))
-    console = Console(file=sys.stdout)
-    if not console.is_terminal:
-        # A file or a pipe has no width; make the table as wide as it needs.
-        wide = Console(file=sys.stdout, width=10_000)
-        width = max(wide.measure(grid).maximum, wide.measure(table.title).maximum)
-        console = Console(file=sys.stdout, width=width)
-    console.print(grid)
+    say_sentence(table.title)
+    Console(file=sys.stdout, width=width).print(grid)
+    if left_out := [column.name for column in columns if column not in kept]:
+        say_sentence(f"Not shown, for lack of room: {', '.join(left_out)}.")
     if table.note:
-        say(table.note)
+        say_sentence(table.note)
 
 
 @contextlib.contextmanager

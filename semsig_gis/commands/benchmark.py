@@ -187,11 +187,13 @@ class Benchmark:
                 with reporter.progress("explaining failures"):
                     failures = photograph_failures(scored, locator, sets, city, method=method)
                 result["failures"] = {"method": method, "views": failures}
-        text: list[str | Table] = [_table(result["table"])]
         if self.out is not None:
             write_json(self.out, result)
-            text.append(f"results: {self.out}")
-        return Result(values=lambda: result, text=text)
+        return Result(
+            values=lambda: result,
+            summary=[_table(result["table"])],
+            files={} if self.out is None else {"results": self.out},
+        )
 
     def _keep_data(self) -> None:
         """Raise InputError if a file of the data set would be overwritten."""

@@ -15,7 +15,6 @@ from semsig_gis.core import InputError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from semsig_gis.core import Table
     from semsig_gis.objects import StreetObjects
 
 
@@ -160,7 +159,11 @@ class Build:
                 )
             cells, entries = manifest.cells, manifest.entries
         properties = Info(database=self.out).run(reporter)
-        return replace(properties, text=self._text(cells, entries))
+        return replace(
+            properties,
+            summary=self._summary(cells, entries),
+            files={"signature database": self.out},
+        )
 
     def _build_whole(
         self, objects: StreetObjects, specs: dict[str, Any], reporter: Reporter
@@ -189,8 +192,11 @@ class Build:
         save_with_store(database, store, self.out)
         return len(database), len(database.codes)
 
-    def _text(self, cells: int, entries: int) -> Iterator[str | Table]:
+    def _summary(self, cells: int, entries: int) -> Iterator[str]:
         from semsig_gis.database import open_city
 
         size = open_city(self.out).bytes / 1e6
-        yield f"{cells:,} cells of mean length {entries / cells:.3f}, {size:.1f} MB: {self.out}"
+        yield (
+            f"{cells:,} cells of {self.step:g} m, from which {entries / cells:.1f} objects are "
+            f"seen on average, in {size:.1f} MB."
+        )

@@ -94,7 +94,7 @@ class Calibrate:
                 advance(number + 1, len(samples))
         rule = calibrate(masses, errors <= radius, precision=self.precision, radius=radius)
         save_rule(rule, self.out)
-        return Result(values=rule.to_dict, text=[self._sentence(rule), f"rule: {self.out}"])
+        return Result(values=rule.to_dict, summary=[self._sentence(rule)], files={"rule": self.out})
 
     def _sentence(self, rule: AnswerRule) -> str:
         share = percent(self.precision, 0)

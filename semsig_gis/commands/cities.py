@@ -35,7 +35,12 @@ def locate_in_cities(
 ) -> Result:
     """Answer a query that may be from any of some cities, from its locator in each."""
     from semsig_gis.localization import locate_in_areas
-    from semsig_gis.output import cities_tables, city_candidates, likeliest_city
+    from semsig_gis.output import (
+        cities_summary,
+        cities_tables,
+        city_candidates,
+        likeliest_city,
+    )
 
     locators, queries = zip(*cities.values(), strict=True)
     with reporter.progress("answering"):
@@ -52,4 +57,8 @@ def locate_in_cities(
             "candidates": city_candidates(locations, top),
         }
 
-    return Result(values=values, text=cities_tables(locations, elsewhere, top=top))
+    return Result(
+        values=values,
+        summary=cities_summary(locations, elsewhere),
+        tables=cities_tables(locations, elsewhere, top=top),
+    )

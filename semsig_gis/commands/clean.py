@@ -59,10 +59,10 @@ class Clean:
                 "bytes": total,
                 "removed": [file.to_dict() for file in removed],
             },
-            text=self._text(removed, total),
+            summary=self._summary(removed, total),
         )
 
-    def _text(self, removed: tuple[Companion, ...], total: int) -> Iterator[str | Table]:
+    def _summary(self, removed: tuple[Companion, ...], total: int) -> Iterator[str | Table]:
         from semsig_gis.output import companion_table
 
         if not removed:

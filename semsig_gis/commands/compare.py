@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated
 
 from semsig_gis.commands.model import Option, Reporter, Result, command
-from semsig_gis.core import Table
 
 RESULT = Option(
     "Folder of an experiment or of an evaluation.",
@@ -47,15 +46,22 @@ class Compare:
         pairs = common_cases(open_results(self.first), open_results(self.second))
         tables = {name: compare_evaluations(*pair) for name, pair in pairs.items()}
 
-        def text() -> Iterator[str | Table]:
+        def summary() -> Iterator[str]:
             names = str(self.first), str(self.second)
             for name, table in tables.items():
-                case = f"{name}: " * bool(name)
                 changed = changed_successes(*pairs[name])
-                yield case + comparison_sentence(table, changed, names=names)
-                yield comparison_table(table, f"{case}{self.first} and {self.second}")
+                yield _case(name) + comparison_sentence(table, changed, names=names)
 
         return Result(
             values=lambda: {name: plain_records(table) for name, table in tables.items()},
-            text=text(),
+            summary=summary(),
+            tables=(
+                comparison_table(table, f"{_case(name)}{self.first} and {self.second}")
+                for name, table in tables.items()
+            ),
         )
+
+
+def _case(name: str) -> str:
+    """Return the name of a case before a text; a single case has no name."""
+    return f"{name}: " if name else ""

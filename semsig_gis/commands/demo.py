@@ -11,7 +11,6 @@ from typing_extensions import TypedDict
 
 from semsig_gis.commands.model import Option, Reporter, Result, command
 from semsig_gis.commands.options import MOST_QUERIES, MOST_SEED, online_notes
-from semsig_gis.core import Table
 
 if TYPE_CHECKING:
     from semsig_gis.evaluation import Evaluation
@@ -78,13 +77,17 @@ class Demo:
             "files": [str(self.out / name) for name in names],
         }
         return Result(
-            values=lambda: values, text=self._text(evaluation), notes=online_notes(offline)
+            values=lambda: values,
+            summary=self._summary(evaluation),
+            files={
+                "map": self.out / "map.html",
+                "GeoPackage": self.out / "city.gpkg",
+                "signature database": self.out / "city.parquet",
+            },
+            notes=online_notes(offline),
         )
 
-    def _text(self, evaluation: Evaluation) -> Iterator[str | Table]:
-        from semsig_gis.output import evaluation_tables
+    def _summary(self, evaluation: Evaluation) -> Iterator[str]:
+        from semsig_gis.output import evaluation_headline
 
-        yield from evaluation_tables(evaluation)
-        yield f"map:        {self.out / 'map.html'}  (open it in a browser)"
-        yield f"GeoPackage: {self.out / 'city.gpkg'}  (open it in QGIS)"
-        yield f"database:   {self.out / 'city.parquet'}"
+        yield evaluation_headline(evaluation)

@@ -24,4 +24,4 @@ class Draft:
         """Return the lines of the catalogue."""
         from semsig_gis.objects import draft_catalog
 
-        return Result(text=[draft_catalog(self.file, crs=self.crs).removesuffix("\n")])
+        return Result(summary=[draft_catalog(self.file, crs=self.crs).removesuffix("\n")])

@@ -165,7 +165,13 @@ class Evaluate:
             summary = evaluation.summary()
             return summary if foreign is None else {**summary, "foreign": plain_records(foreign)}
 
-        return Result(values=values, text=self._text(evaluation, foreign))
+        files = {"results": self.out, "report": self.report}
+        return Result(
+            values=values,
+            summary=self._summary(evaluation),
+            tables=self._tables(evaluation, foreign),
+            files={what: path for what, path in files.items() if path is not None},
+        )
 
     def _refuse_likelihood(self, ranking: str) -> None:
         """Raise InputError for an option that works only with the likelihood method."""
@@ -207,10 +213,14 @@ class Evaluate:
         )
         return build_index(city.database, noise)
 
-    def _text(self, evaluation: Evaluation, foreign: pd.DataFrame | None) -> Iterator[str | Table]:
-        from semsig_gis.output import evaluation_headline, evaluation_tables
+    def _summary(self, evaluation: Evaluation) -> Iterator[str]:
+        from semsig_gis.output import evaluation_headline
 
         yield evaluation_headline(evaluation)
+
+    def _tables(self, evaluation: Evaluation, foreign: pd.DataFrame | None) -> Iterator[Table]:
+        from semsig_gis.output import evaluation_tables
+
         yield from evaluation_tables(evaluation)
         if foreign is not None:
             yield Table.of(
@@ -218,7 +228,3 @@ class Evaluate:
                 ("objects in the view", "own", "answered", "foreign", "answered"),
                 foreign.round(3).astype(object).fillna("").to_numpy().tolist(),
             )
-        if self.out is not None:
-            yield f"results: {self.out}"
-        if self.report is not None:
-            yield f"report: {self.report}  (open it in a browser)"

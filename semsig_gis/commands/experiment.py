@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from semsig_gis.commands.model import Option, Reporter, Result, command
 from semsig_gis.commands.options import Scheduler, Workers
-from semsig_gis.core import Table
 
 
 @command(
@@ -53,10 +51,9 @@ class Experiment:
                 progress=advance,
             )
 
-        def text() -> Iterator[str | Table]:
-            yield from experiment_tables(spec, results)
-            yield f"results: {self.out}"
-
         return Result(
-            values=lambda: {name: item.summary() for name, item in results.items()}, text=text()
+            values=lambda: {name: item.summary() for name, item in results.items()},
+            summary=[f"{len(results):,} evaluations."],
+            tables=experiment_tables(spec, results),
+            files={"results": self.out},
         )

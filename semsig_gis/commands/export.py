@@ -93,7 +93,7 @@ class Export:
         from semsig_gis.objects import open_objects
         from semsig_gis.output import ITEM, export_database, export_item
 
-        text = [f"exported: {self.out}"]
+        files = {"exported": self.out}
         values: Exported = {"exported": str(self.out)}
         if self.out.suffix.lower() == ITEM:
             others = (self.evaluation, self.layer, self.smooth, self.h3, self.geometry)
@@ -102,7 +102,7 @@ class Export:
                     f"{self.out} describes the files of a database; give only --objects with it."
                 )
             export_item(self.database, self.out, objects=self.objects)
-            return Result(values=lambda: values, text=text)
+            return Result(values=lambda: values, summary=["A description."], files=files)
         city = open_city(self.database)
         queries = None if self.evaluation is None else open_evaluation(self.evaluation)
         # Hexagons count the objects that the database was built from, if they are stored with it.
@@ -120,4 +120,7 @@ class Export:
                 h3=self.h3,
                 progress=advance,
             )
-        return Result(values=lambda: {**values, "cells": len(city.database)}, text=text)
+        cells = len(city.database)
+        return Result(
+            values=lambda: {**values, "cells": cells}, summary=[f"{cells:,} cells."], files=files
+        )

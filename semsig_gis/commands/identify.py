@@ -156,7 +156,13 @@ class Identify:
             summary = columns.summary(object_counts=counts)
             return summary if check is None else {**summary, "check": check.to_dict()}
 
-        return Result(values=values, text=self._text(columns, check, counts))
+        report = {} if self.out is None else {"report": self.out / "report.html"}
+        return Result(
+            values=values,
+            summary=[],
+            tables=self._tables(columns, check, counts),
+            files={"columns": self.database, **report},
+        )
 
     def _stored(self, city: City, noise: Noise, reporter: Reporter) -> Identifiability | None:
         """Return the columns of the database if they have the same settings."""
@@ -166,17 +172,14 @@ class Identify:
         stored = columns.noise, columns.radius, columns.view, columns.seed
         return columns if stored == (noise, self.radius, self.view, self.seed) else None
 
-    def _text(
+    def _tables(
         self,
         columns: Identifiability,
         check: IdentifiabilityCheck | None,
         counts: Mapping[int, int] | None,
-    ) -> Iterator[str | Table]:
+    ) -> Iterator[Table]:
         from semsig_gis.output import check_tables, identifiability_tables
 
         yield from identifiability_tables(columns, object_counts=counts)
         if check is not None:
             yield from check_tables(check)
-        yield f"columns: {self.database}"
-        if self.out is not None:
-            yield f"report: {self.out / 'report.html'}"

@@ -60,12 +60,12 @@ class Import:
             reporter.remark(note)
         cells = len(contents.database)
         values: Imported = {"database": str(self.out), "cells": cells}
-        text = [f"database: {self.out}  ({cells:,} cells)"]
+        files = {"signature database": self.out}
         if self.objects is not None and contents.objects is not None:
             save_objects(contents.objects, self.objects, keep_order=True)
             values |= {"objects": str(self.objects), "street_objects": len(contents.objects)}
-            text.append(f"objects:  {self.objects}")
+            files["street objects"] = self.objects
         save_database(contents.database, self.out)
         if contents.identifiability is not None:
             save_identifiability(contents.identifiability, self.out)
-        return Result(values=lambda: values, text=text)
+        return Result(values=lambda: values, summary=[f"{cells:,} cells."], files=files)

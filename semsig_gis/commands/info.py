@@ -106,9 +106,9 @@ class Info:
             files = [file.to_dict() for file in companions(self.database)]
             return summary | {"beside": files}
 
-        return Result(values=values, text=self._text(city, columns))
+        return Result(values=values, summary=[], tables=self._tables(city, columns))
 
-    def _text(self, city: City, columns: Identifiability | None) -> Iterator[str | Table]:
+    def _tables(self, city: City, columns: Identifiability | None) -> Iterator[str | Table]:
         from semsig_gis.database import companions
         from semsig_gis.output import (
             companion_table,

@@ -130,14 +130,18 @@ class Learn:
         estimate = replace(estimate, spec=fresh)
         save_noise(estimate.noise, self.out)
 
-        def text() -> Iterator[str | Table]:
-            yield _rate_table(estimate)
+        def summary() -> Iterator[str]:
             if self.map_age:
                 yield self._correction(learnt, fresh)
             yield _verdict(estimate)
-            yield f"noise model: {self.out}"
 
-        return Result(values=estimate.to_dict, text=text(), notes=north.notes)
+        return Result(
+            values=estimate.to_dict,
+            summary=summary(),
+            tables=[_rate_table(estimate)],
+            files={"noise model": self.out},
+            notes=north.notes,
+        )
 
     def _from_views(self, city: City, views: Path, reporter: Reporter) -> Result:
         """Write a noise model that is learnt from views of unknown places."""
@@ -161,7 +165,7 @@ class Learn:
             )
         noise = replace(noise, name=self.out.stem)
         save_noise(noise, self.out)
-        return Result(values=noise.to_dict, text=[f"noise model: {self.out}"])
+        return Result(values=noise.to_dict, summary=[], files={"noise model": self.out})
 
     def _correction(self, learnt: NoiseSpec, fresh: NoiseSpec) -> str:
         """Return a sentence on what the age of the map explains."""

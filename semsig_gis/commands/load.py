@@ -153,6 +153,7 @@ class LoadOptions:
         """Write the objects and their surroundings; return their quality report."""
         notes = list(loaded.notes)
         street_objects.save_objects(loaded.objects, self.out)
+        files = {"street objects": self.out}
         for what, table, path in (
             ("buildings", loaded.buildings, self.buildings),
             ("streets", loaded.streets, self.streets),
@@ -161,17 +162,23 @@ class LoadOptions:
                 notes.append(f"there are no {what} in what was loaded, so {path} is not written")
             elif path is not None:
                 street_objects.save_surroundings(table, path)
+                files[what] = path
         report = street_objects.quality_report(
             loaded.objects, loaded.report, loaded.conflation, notes=notes
         )
-        return Result(values=report.to_dict, text=self._text(report), notes=notes)
+        return Result(
+            values=report.to_dict,
+            summary=[f"{len(loaded.objects):,} street objects of {len(report.classes)} classes."],
+            tables=self._tables(report),
+            files=files,
+            notes=notes,
+        )
 
-    def _text(self, report: street_objects.QualityReport) -> Iterator[str | Table]:
+    def _tables(self, report: street_objects.QualityReport) -> Iterator[Table]:
         from semsig_gis.output import quality_tables
 
         # The notes are shown below the tables only.
         yield from quality_tables(replace(report, notes=()))
-        yield f"street objects: {self.out}"
 
 
 AT_THE_EDGE = (

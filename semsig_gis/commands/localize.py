@@ -368,7 +368,14 @@ class Localize(SearchOptions, QueryOptions):
             with_regions = regions is not None and not self._writes_chances
             return {**answer.to_dict(), **({"searched": regions} if with_regions else {})}
 
-        return Result(values=values, text=self._text(answer, regions), notes=notes)
+        files = {"map": self.map, "chances" if self._writes_chances else "regions": self.out}
+        return Result(
+            values=values,
+            summary=self._summary(answer, regions),
+            tables=self._tables(answer),
+            files={what: path for what, path in files.items() if path is not None},
+            notes=notes,
+        )
 
     def _write(
         self, out: Path, city: City, answer: Answer, locator: Locator[Answer]
@@ -383,18 +390,19 @@ class Localize(SearchOptions, QueryOptions):
         share = REGION_SHARE if self.share is None else self.share
         return export_answer(answer, city.database, out, share=share, within=self.within).to_dict()
 
-    def _text(self, answer: Any, regions: RegionsRecord | None) -> Iterator[str | Table]:  # noqa: ANN401 - an answer of any method
-        from semsig_gis.output import answer_tables
+    def _summary(self, answer: Any, regions: RegionsRecord | None) -> Iterator[str | Table]:  # noqa: ANN401 - an answer of any method
+        from semsig_gis.output import answer_summary
 
-        yield from answer_tables(answer)
-        if self.map is not None:
-            yield f"map: {self.map}"
-        if self._writes_chances:
-            yield f"chances: {self.out}"
-        elif regions is not None:
+        yield from answer_summary(answer)
+        if regions is not None and not self._writes_chances:
             count = regions["regions"]
             noun = "region" if count == 1 else "regions"
             yield (
-                f"to search: {count:,} {noun}, {regions['km2']:.4g} km2, "
-                f"{regions['percent']:.3g} % of the city: {self.out}"
+                f"To search: {count:,} {noun}, {regions['km2']:.4g} km², "
+                f"{regions['percent']:.3g} % of the city."
             )
+
+    def _tables(self, answer: Any) -> Iterator[str | Table]:  # noqa: ANN401 - an answer of any method
+        from semsig_gis.output import answer_tables
+
+        yield from answer_tables(answer)

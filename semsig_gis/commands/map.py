@@ -143,7 +143,8 @@ class Map:
             offline = save_map(page, self.out, title=self.title or city_name(self.database))
         return Result(
             values=lambda: {"map": str(self.out)},
-            text=[f"map: {self.out}"],
+            summary=[],
+            files={"map": self.out},
             notes=online_notes(offline, tiles=self.tiles),
         )
 

@@ -60,9 +60,11 @@ class Merge:
 
         with reporter.progress("merging") as advance:
             report = merge_databases(self.first, self.second, out=self.out, progress=advance)
-        text = (
-            f"{report.cells:,} cells of {report.objects:,} objects: {self.out}. In both were "
+        sentence = (
+            f"{report.cells:,} cells of {report.objects:,} objects. In both databases were "
             f"{report.shared_cells:,} cells and {report.shared_objects:,} objects; "
             f"{report.recomputed:,} cells near both were computed again."
         )
-        return Result(values=report.to_dict, text=[text])
+        return Result(
+            values=report.to_dict, summary=[sentence], files={"signature database": self.out}
+        )

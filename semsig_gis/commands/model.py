@@ -76,12 +76,16 @@ class Result:
     """What a command returns.
 
     `values` returns plain values for JSON, or with `stream` an iterator of them, one for each
-    line. `text` has the lines and tables to read; they may be computed while they are read. None:
-    the result has no such form. `notes` are sentences to show below it.
+    line. `summary` has what a person reads: a sentence or a few lines, and a table only if the
+    answer is a list; None: the result has no such form. `tables` has the details, which are shown
+    on demand. Both may be computed while they are read. `files` are the written files by what
+    they contain, and `notes` are sentences to show above them.
     """
 
     values: Callable[[], Any] | None = None
-    text: Iterable[str | Table] | None = None
+    summary: Iterable[str | Table] | None = None
+    tables: Iterable[str | Table] = ()
+    files: Mapping[str, Path] = dataclasses.field(default_factory=dict)
     stream: bool = False
     notes: Sequence[str] = ()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -16,7 +16,7 @@ from semsig_gis.commands.options import MOST_QUERIES, MOST_WORKERS, Seed
 from semsig_gis.core import Table
 
 if TYPE_CHECKING:
-    from semsig_gis.output import Number, Report, Section
+    from semsig_gis.output import Number, Section
 
 LARGE = 1000  # numbers from here on have no decimals
 
@@ -136,26 +136,29 @@ class Reproduce:
             ]
             return rows
 
-        return Result(values=values, text=self._text(report, numbers))
-
-    def _text(self, report: Report, numbers: list[tuple[Section, Number]]) -> Iterator[str | Table]:
-        yield report.headline
-        yield Table.of(
-            report.title,
-            ("Section", "What", "", "Ours", "95 %", "Paper"),
-            [
-                (
-                    *(section.title, number.row, number.column, _number(number.ours)),
-                    ""
-                    if number.low is None or number.high is None
-                    else f"{number.low:.4g} to {number.high:.4g}",
-                    _number(number.paper),
-                )
-                for section, number in numbers
-            ],
+        return Result(
+            values=values,
+            summary=[report.headline],
+            tables=[_table(report.title, numbers)],
+            files={"report": self.out / "report.html", "numbers": self.out / "numbers.csv"},
         )
-        yield f"report: {self.out / 'report.html'}  (open it in a browser)"
-        yield f"numbers: {self.out / 'numbers.csv'}"
+
+
+def _table(title: str, numbers: list[tuple[Section, Number]]) -> Table:
+    return Table.of(
+        title,
+        ("Section", "What", "", "Ours", "95 %", "Paper"),
+        [
+            (
+                *(section.title, number.row, number.column, _number(number.ours)),
+                ""
+                if number.low is None or number.high is None
+                else f"{number.low:.4g} to {number.high:.4g}",
+                _number(number.paper),
+            )
+            for section, number in numbers
+        ],
+    )
 
 
 def _number(value: float | None) -> str:

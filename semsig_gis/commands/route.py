@@ -72,7 +72,7 @@ class Route(SearchOptions, _Views):
     def run(self, reporter: Reporter) -> Result:
         """Answer the views together."""
         from semsig_gis.database import open_city
-        from semsig_gis.output import route_tables
+        from semsig_gis.output import route_summary
 
         city = open_city(self.database)
         north = query_north(city, self.north, self.date)
@@ -87,7 +87,7 @@ class Route(SearchOptions, _Views):
                 yield {"id": name, **location.to_dict()}
 
         return Result(
-            values=values, text=route_tables(city.path.name, names, locations), stream=True
+            values=values, summary=route_summary(city.path.name, names, locations), stream=True
         )
 
     def _read(self, city: City, north: North) -> Views:

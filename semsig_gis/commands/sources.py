@@ -93,12 +93,12 @@ class Sources:
 
         if self.name is not None:
             catalog = load_catalog(self.name)
-            return Result(values=partial(asdict, catalog), text=_details(catalog))
+            return Result(values=partial(asdict, catalog), summary=_details(catalog))
         listed = [load_catalog(name) for name in catalogs()]
         readers = list(READERS)
         return Result(
             values=lambda: {"catalogs": [*map(_row, listed)], "readers": readers},
-            text=_list(listed, readers),
+            summary=_list(listed, readers),
         )
 
 

@@ -59,6 +59,11 @@ class Synthesize:
         save_objects(objects, self.out / "objects.parquet")
         for layer in surroundings:
             save_surroundings(layer.table, self.out / f"{layer.spec.role}.parquet")
-        names = ("objects", *(layer.spec.role for layer in surroundings))
-        files = [str(self.out / f"{name}.parquet") for name in names]
-        return Result(values=lambda: {"objects": len(objects), "files": files}, text=files)
+        files = {"street objects": self.out / "objects.parquet"} | {
+            layer.spec.role: self.out / f"{layer.spec.role}.parquet" for layer in surroundings
+        }
+        return Result(
+            values=lambda: {"objects": len(objects), "files": [*map(str, files.values())]},
+            summary=[f"A made-up city with {len(objects):,} street objects."],
+            files=files,
+        )

@@ -110,4 +110,9 @@ class Update:
         def values() -> dict[str, Any]:
             return report.to_dict() | ({} if self.years is None else {"years": self.years})
 
-        return Result(values=values, text=update_tables(report))
+        return Result(
+            values=values,
+            summary=[],
+            tables=update_tables(report),
+            files={"signature database": self.out or self.database},
+        )

@@ -230,13 +230,14 @@ class Views:
             rows.append({"id": name, **time, **built_view.to_dict(taxonomy)})
         write_whole(self.out, "".join(json.dumps(row) + "\n" for row in rows))
         passed = [str(file) for file in unknown]
-        text = (
-            f"{self.out}: {_many(len(views), 'view')} of {_many(tally.photos, 'picture')} with "
+        sentence = (
+            f"{_many(len(views), 'view')} of {_many(tally.photos, 'picture')} with "
             f"{_many(tally.objects, 'object')}, {tally.ranges:,} with a range."
         )
         return Result(
             values=lambda: {"views": len(views), **tally.to_dict(), "unknown_files": passed},
-            text=[text],
+            summary=[sentence],
+            files={"views": self.out},
             notes=[*_notes(passed, tally)],
         )
 

@@ -37,6 +37,8 @@ class Table:
         Row and column of the cells in bold.
     intervals : mapping of (int, int) to str, optional
         Intervals of the numbers in cells, by row and column.
+    minor : tuple of str, optional
+        Columns that a narrow terminal leaves out first.
 
     Examples
     --------
@@ -56,6 +58,7 @@ class Table:
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     bold: frozenset[tuple[int, int]] = frozenset()
     intervals: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    minor: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, title: str, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> Table:

@@ -134,12 +134,14 @@ from .report_model import Report as Report
 from .report_model import Scene as Scene
 from .report_model import SceneObject as SceneObject
 from .report_model import Section as Section
+from .tables.answer import answer_summary as answer_summary
 from .tables.answer import answer_tables as answer_tables
+from .tables.answer import cities_summary as cities_summary
 from .tables.answer import cities_tables as cities_tables
 from .tables.answer import city_candidates as city_candidates
 from .tables.answer import likeliest_city as likeliest_city
-from .tables.answer import question_tables as question_tables
-from .tables.answer import route_tables as route_tables
+from .tables.answer import route_summary as route_summary
+from .tables.answer import suggest_summary as suggest_summary
 from .tables.answer_records import LocalizeRecord as LocalizeRecord
 from .tables.answer_records import RouteRecord as RouteRecord
 from .tables.answer_records import SuggestRecord as SuggestRecord

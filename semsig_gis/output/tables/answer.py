@@ -21,57 +21,68 @@ EXPLANATION = (
 )
 
 
-def answer_tables(answer: Location | Localization) -> Iterator[Table | str]:
-    """Yield the tables and sentences that describe an answer.
+def answer_summary(answer: Location | Localization) -> Iterator[Table | str]:
+    """Yield what a person reads of an answer: the place, and how the query was understood.
 
-    By likelihood, they are the candidates, what was known of the place, the explanations and the
-    place; by distance, the candidates; then the query as it was understood, its north, and notes.
+    If there are explanations, they are between the two.
     """
-    cells = f"{answer.cells:,} cells"
-    number = len(answer.columns["cell"])
     if isinstance(answer, Location):
-        title = f"{number} best places in {cells}, by likelihood ({answer.noise} noise)"
-        yield _candidate_table(answer, title, "chance", percent)
-        yield from _known_sentences(answer.known)
+        yield from place_sentences(answer)
         for rank, explanation in enumerate(answer.explanations, 1):
             yield _explanation_table(rank, explanation, answer.north)
-        yield from place_sentences(answer)
+        yield from _known_sentences(answer.known)
     else:
-        title = f"{number} best of {cells}, by {answer.used}"
-        yield _candidate_table(answer, title, "distance", figure)
         yield from tie_sentences(answer)
     yield from (*query_sentences(answer), *north_sentences(answer), *note_sentences(answer))
 
 
+def answer_tables(answer: Location | Localization) -> Iterator[Table]:
+    """Yield the table of the candidates of an answer."""
+    cells = f"{answer.cells:,} cells"
+    number = len(answer.columns["cell"])
+    if isinstance(answer, Location):
+        title = f"{number} best places in {cells} (noise: {answer.noise})"
+        yield _candidate_table(answer, title, "chance", percent)
+    else:
+        title = f"{number} best of {cells}, by {answer.used}"
+        yield _candidate_table(answer, title, "distance", figure)
+
+
+def cities_summary(locations: Mapping[str, Location], elsewhere: float) -> Iterator[str]:
+    """Yield the chance of each of some cities, the likeliest place, and the query."""
+    name, best = likeliest_city(locations)
+    for area, location in locations.items():
+        yield f"{area}: chance {percent(1.0 - location.elsewhere)}."
+    yield f"elsewhere: chance {percent(elsewhere)}."
+    yield f"In {name}:"
+    yield from (
+        *place_sentences(best),
+        *query_sentences(best),
+        *note_sentences(*locations.values()),
+    )
+
+
 def cities_tables(
     locations: Mapping[str, Location], elsewhere: float, *, top: int
-) -> list[Table | str]:
-    """Return the best candidates of some cities, the chance of each, and the likeliest place."""
-    name, best = likeliest_city(locations)
+) -> Iterator[Table]:
+    """Yield the table of the best candidates of some cities."""
+    _, best = likeliest_city(locations)
     rows = city_candidates(locations, top)
     cells = sum(location.cells for location in locations.values())
     places = (
         (
             *(f"{row['rank']:,}", row["city"], str(row["cell_id"])),
-            *(f"{row['lon']:.6f}", f"{row['lat']:.6f}", percent(row["chance"]), row["types"]),
+            *(f"{row['lat']:.6f}", f"{row['lon']:.6f}", percent(row["chance"]), row["types"]),
         )
         for row in rows
     )
-    table = Table(
-        f"{len(rows)} best places in {cells:,} cells of {len(locations)} cities, by likelihood "
-        f"({best.noise} noise)",
-        ("rank", "city", "cell", "lon", "lat", "chance", "types"),
+    yield Table(
+        f"{len(rows)} best places in {cells:,} cells of {len(locations)} cities "
+        f"(noise: {best.noise})",
+        ("rank", "city", "cell", "lat", "lon", "chance", "types"),
         (*places, ("", "elsewhere", "", "", "", percent(elsewhere), "")),
+        minor=MINOR,
     )
-    chances = {area: percent(1.0 - location.elsewhere) for area, location in locations.items()}
-    return [
-        table,
-        *(f"{area}: chance {chance}." for area, chance in chances.items()),
-        f"In {name}:",
-        *place_sentences(best),
-        *query_sentences(best),
-        *note_sentences(*locations.values()),
-    ]
 
 
 def likeliest_city(locations: Mapping[str, Location]) -> tuple[str, Location]:
@@ -90,7 +101,7 @@ def city_candidates(locations: Mapping[str, Location], top: int) -> list[dict[st
     return [{**row, "rank": rank} for rank, row in enumerate(rows, 1)]
 
 
-def route_tables(
+def route_summary(
     city: str, names: Iterable[object], locations: Sequence[Location]
 ) -> list[Table | str]:
     """Return the place of each view of a route, the last place in words, and the notes."""
@@ -105,11 +116,11 @@ def route_tables(
         for name, location in zip(names, locations, strict=True)
     )
     heads = ("view", *POSITION, "± m, if there", "chance", "answered")
-    table = Table(f"{len(locations)} views of {city}", heads, tuple(rows))
+    table = Table(f"{len(locations)} views of {city}", heads, tuple(rows), minor=MINOR)
     return [table, *place_sentences(locations[-1]), *note_sentences(*locations)]
 
 
-def question_tables(questions: Iterable[ClassQuestion], location: Location) -> list[Table | str]:
+def suggest_summary(questions: Iterable[ClassQuestion], location: Location) -> list[Table | str]:
     """Return what to look for next, with the place, the query and the notes of the answer."""
     rows = (
         (row.text, row.item.symbol, percent(row.chance), f"{round(row.gain, 4):.3f}")
@@ -126,7 +137,7 @@ def place_sentences(location: Location) -> list[str]:
     Without an answer, the region comes first, and the position only with "if it is there".
     """
     estimate, sure = location.estimate, location.answer.given
-    x, y, lon, lat = _position(estimate.x, estimate.y, *location.degrees)
+    x, y, lat, lon = _position(estimate.x, estimate.y, *location.degrees)
     best, there = ("", "") if sure else ("Best place: ", "If it is there: ")
     chance = f"within {location.rule.radius:g} m of it: chance {percent(location.answer.mass)}"
     longer, shorter, bearing = estimate.ellipse()
@@ -197,14 +208,16 @@ def _candidate_table(
         rank = f"{low:,}" if low == high else f"{low}-{high}"
         position = _position(row["x"], row["y"], row["lon"], row["lat"])
         rows.append((rank, str(row["cell_id"]), *position, score_text(row[score]), row["types"]))
-    return Table(title, ("rank", "cell", *POSITION, score, "types"), tuple(rows))
+    heads = ("rank", "cell", *POSITION, score, "types")
+    return Table(title, heads, tuple(rows), minor=MINOR)
 
 
-POSITION = ("x", "y", "lon", "lat")
+POSITION = ("x", "y", "lat", "lon")
+MINOR = ("cell", "x", "y")  # a place for people is in degrees
 
 
 def _position(x: float, y: float, lon: float, lat: float) -> tuple[str, str, str, str]:
-    return f"{x:.1f}", f"{y:.1f}", f"{lon:.6f}", f"{lat:.6f}"
+    return f"{x:.1f}", f"{y:.1f}", f"{lat:.6f}", f"{lon:.6f}"
 
 
 def _known_sentences(knowledge: Mapping[str, Any]) -> Iterator[str]:
