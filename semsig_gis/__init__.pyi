@@ -34,6 +34,7 @@ from .objects import (
     choose_layers as choose_layers,
     conflate as conflate,
     draft_catalog as draft_catalog,
+    load as load,
     objects_from_frame as objects_from_frame,
     open_objects as open_objects,
     quality_report as quality_report,

@@ -181,12 +181,6 @@ class LoadOptions:
         yield from quality_tables(replace(report, notes=()))
 
 
-AT_THE_EDGE = (
-    "cells within sight of the edge of the clip see only a part of what is there; give `semsig "
-    "build` an --area that is smaller by the visibility range"
-)
-
-
 @command("load", title="Load street objects", group="Street objects", order=1, returns=Quality)
 @dataclass(frozen=True, kw_only=True)
 class Load(LoadOptions):
@@ -220,60 +214,21 @@ class Load(LoadOptions):
 
     def run(self, reporter: Reporter) -> Result:
         """Write the street objects; return their quality report."""
-        from semsig_gis.sources import (
-            BOX,
-            clip_layers,
-            combine_catalogs,
-            detect_catalogs,
-            load_catalog,
-            parse_area,
-        )
-
-        names = self.catalog
-        if not names:
-            detected, lines = detect_catalogs(self.files)
-            names = list(detected)
-            for line in lines:
-                reporter.remark(line)
-        catalog = combine_catalogs([load_catalog(name) for name in names])
-        specs = street_objects.choose_layers(
-            catalog,
-            self.layer or (),
-            selection=self.selection,
-            surroundings=bool(self.buildings or self.streets),
-        )
-        # Layers in files read anyway: their objects are counted, to say what is left out.
-        others = street_objects.layers_in_same_extracts(catalog, specs)
-        with reporter.progress("reading") as advance:
-            layers, absent = street_objects.read_files(
-                [*specs, *others],
+        with reporter.progress("loading") as advance:
+            loaded = street_objects.load(
                 self.files,
-                filters=self.filter,
+                catalog=self.catalog or (),
+                layers=self.layer or (),
+                selection=self.selection,
+                surroundings=bool(self.buildings or self.streets),
+                clip=self.clip,
                 crs=self.crs,
-                area=None if self.clip in {None, BOX} else parse_area(self.clip),
-                progress=advance,
-            )
-            layers += street_objects.read_small_layers(
-                catalog, [*specs, *others], self.files, filters=self.filter, crs=self.crs
-            )
-        notes = [
-            f"layer {spec.name!r} has no file here ({', '.join(spec.files) or 'it names none'}); "
-            "it is left out"
-            for spec in absent
-            if spec not in others
-        ]
-        if self.clip is not None:
-            layers = clip_layers(layers, self.clip)
-            notes.append(AT_THE_EDGE)
-        with reporter.progress("joining the objects"):
-            loaded = street_objects.assemble(
-                [layer for layer in layers if layer.spec in specs],
-                catalog,
                 metric_crs=self.metric_crs,
+                filters=self.filter,
                 collapse=self.collapse,
                 merge=self.merge,
-                counted=[layer for layer in layers if layer.spec not in specs],
                 max_distortion=self.max_distortion,
-                notes=notes,
+                progress=advance,
+                tell=reporter.remark,
             )
         return self.save(loaded)

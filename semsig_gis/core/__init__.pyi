@@ -35,6 +35,7 @@ from .geometry import NOTES as NOTES
 from .geometry import ROW_SPAN as ROW_SPAN
 from .geometry import SOURCE as SOURCE
 from .geometry import SOURCE_ID as SOURCE_ID
+from .geometry import AnyCrs as AnyCrs
 from .geometry import Bounds as Bounds
 from .geometry import Distortion as Distortion
 from .geometry import GridSpec as GridSpec
@@ -44,6 +45,7 @@ from .geometry import cell_ids as cell_ids
 from .geometry import cells_near as cells_near
 from .geometry import consecutive as consecutive
 from .geometry import crs_label as crs_label
+from .geometry import crs_text as crs_text
 from .geometry import degree_bounds as degree_bounds
 from .geometry import grid_convergence as grid_convergence
 from .geometry import plane_distortion as plane_distortion

@@ -6,7 +6,7 @@ import functools
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from pyproj import CRS, Geod, Proj, Transformer
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 
 FULL_TURN, HALF_TURN = 360.0, 180.0
+
+AnyCrs: TypeAlias = "CRS | str | int"
+"""A coordinate system, or text or an EPSG code for it."""
 
 
 def wrap_degrees(angles: ArrayLike) -> NDArray[np.float64]:
@@ -58,7 +61,14 @@ LICENSES = "licenses"
 """Key of the attribution lines in the `attrs` of a table of buildings or streets."""
 
 
-def require_metric_crs(crs: CRS | str | int | None) -> CRS:
+def crs_text(crs: AnyCrs) -> str:
+    """Return a coordinate system as text, such as ``EPSG:2154`` for the number 2154."""
+    if isinstance(crs, CRS):
+        return crs.to_string()
+    return f"EPSG:{crs}" if isinstance(crs, int) else crs
+
+
+def require_metric_crs(crs: AnyCrs | None) -> CRS:
     """Return a coordinate system, without its height, if it is metric.
 
     CrsError if it is missing, unknown, in degrees or feet, a Mercator or cylindrical projection

@@ -1,6 +1,6 @@
 """Merge objects of the same class from different sources that are within a radius.
 
-Objects of one source are never merged with each other; `objects.load.build_objects` has already
+Objects of one source are never merged with each other; `objects.layers.build_objects` has already
 collapsed duplicates within a source.
 """
 

@@ -25,6 +25,7 @@ from semsig_gis.core import (
     ObjectClass,
     SemsigError,
     SourceError,
+    crs_text,
     require_metric_crs,
     temporary_folder,
 )
@@ -37,7 +38,7 @@ from semsig_gis.objects.guesses import (
     guess_position,
     sample_layers,
 )
-from semsig_gis.objects.load import assemble, read_files
+from semsig_gis.objects.layers import assemble, read_files
 from semsig_gis.sources import (
     ANY_VALUE,
     BETWEEN_SLASHES,
@@ -56,6 +57,7 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from semsig_gis.core import AnyCrs
     from semsig_gis.objects.guesses import Column, LayerSample
 
 
@@ -86,14 +88,14 @@ class _Draft:
     crs_reason: str = ""
 
 
-def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
+def draft_catalog(path: str | Path, *, crs: AnyCrs | None = None) -> str:
     r"""Draft a catalogue for a file from its names, its fields and its values.
 
     Parameters
     ----------
     path : str or Path
         A vector file, an archive with such files, or a table of a portal (JSON, CSV, Parquet).
-    crs : str, optional
+    crs : int, str or pyproj.CRS, optional
         CRS of a file that does not state one.
 
     Returns
@@ -135,7 +137,8 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
     layers = [item for item in items if item.info.geometry != NO_GEOMETRY]
     if not layers:
         raise SourceError(f"{path} has no layer with positions; give a file that has one.")
-    drafts = [_draft(path, item, crs) for item in layers]
+    stated = None if crs is None else crs_text(crs)
+    drafts = [_draft(path, item, stated) for item in layers]
     lines = [
         f"# Draft of a catalogue for {_text(path.name)}, from its names, fields and values.",
         f"# Check every line; what only a person can know is marked {EDIT}.",

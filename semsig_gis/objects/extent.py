@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core import Bounds
+    from semsig_gis.core import AnyCrs, Bounds
     from semsig_gis.sources import RawLayer
 
 MAX_DISTORTION = 6.0
@@ -151,7 +151,7 @@ class _Towns:
 def settle_extent(
     layers: Sequence[RawLayer],
     *,
-    crs: CRS | str | None = None,
+    crs: AnyCrs | None = None,
     max_distortion: float = MAX_DISTORTION,
 ) -> tuple[tuple[RawLayer, ...], CRS, tuple[str, ...]]:
     """Check the positions of layers, remove rows far from all others, and choose the metric CRS.
@@ -160,7 +160,7 @@ def settle_extent(
     ----------
     layers : sequence of RawLayer
         The layers.
-    crs : pyproj.CRS or str, optional
+    crs : int, str or pyproj.CRS, optional
         Metric CRS; by default the UTM zone of most objects.
     max_distortion : float
         Maximum error of bearings in degrees, and of lengths in percent, over the data.

@@ -16,7 +16,7 @@ from semsig_gis.core import (
     InputError,
     nearest_name,
 )
-from semsig_gis.objects.load import assemble, choose_layers
+from semsig_gis.objects.layers import assemble, choose_layers
 from semsig_gis.objects.table import Licence
 from semsig_gis.sources import (
     TAGS_READER,
@@ -38,6 +38,7 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from semsig_gis.core import AnyCrs
     from semsig_gis.objects.table import StreetObjects
     from semsig_gis.sources import RawLayer
 
@@ -52,7 +53,7 @@ def objects_from_frame(
     tags: bool = False,
     catalog: Catalog | str | Path | None = None,
     layers: Sequence[str] = (),
-    metric_crs: str | None = None,
+    metric_crs: AnyCrs | None = None,
 ) -> StreetObjects:
     """Convert a GeoDataFrame to street objects.
 
@@ -73,7 +74,7 @@ def objects_from_frame(
         Catalogue of the layers: ``openstreetmap`` by tags, any other by the fields of its layers.
     layers : sequence of str, optional
         Layers of the catalogue, as in `choose_layers`.
-    metric_crs : str, optional
+    metric_crs : int, str or pyproj.CRS, optional
         Metric CRS; by default that of the catalogue, or else the UTM zone of the data.
 
     Returns
@@ -163,7 +164,7 @@ def _require_tags(frame: gpd.GeoDataFrame, *, with_elements: bool = False) -> No
 
 
 def _by_column(
-    frame: gpd.GeoDataFrame, column: str, catalog: Catalog | None, *, metric_crs: str | None
+    frame: gpd.GeoDataFrame, column: str, catalog: Catalog | None, *, metric_crs: AnyCrs | None
 ) -> StreetObjects:
     """Return the objects of a table with a column of class names."""
     taxonomy = built_in_taxonomy() if catalog is None else catalog.taxonomy

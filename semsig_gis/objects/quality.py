@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Distortion, ObjectClass
     from semsig_gis.objects.conflation import ConflatedPair, ConflationReport
-    from semsig_gis.objects.load import LayerReport, LoadReport, UnreadLayer
+    from semsig_gis.objects.layers import LayerReport, LoadReport, UnreadLayer
     from semsig_gis.objects.table import StreetObjects
 
 

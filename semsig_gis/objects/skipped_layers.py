@@ -6,13 +6,14 @@ import contextlib
 from typing import TYPE_CHECKING
 
 from semsig_gis.core import SemsigError
-from semsig_gis.objects.load import read_files
+from semsig_gis.objects.layers import read_files
 from semsig_gis.sources import READERS, find_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    from semsig_gis.core import AnyCrs
     from semsig_gis.sources import Catalog, LayerSpec, RawLayer
 
 # Files up to this size are read in about a second.
@@ -35,7 +36,7 @@ def read_small_layers(
     paths: Sequence[Path],
     *,
     filters: bool = True,
-    crs: str | None = None,
+    crs: AnyCrs | None = None,
 ) -> tuple[RawLayer, ...]:
     """Read the other layers with small files; layers that cannot be read are skipped silently."""
     layers: list[RawLayer] = []

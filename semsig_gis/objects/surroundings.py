@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import shapely
-from pyproj import CRS
 
 from semsig_gis.core import CLASS_NAME, LICENSES, InputError, SourceError
 from semsig_gis.objects.table import layer_licences
@@ -23,6 +22,7 @@ from semsig_gis.sources import (
     join_areas,
     load_catalog,
     parse_area,
+    parse_crs,
     read_parquet,
     reader,
     transformed,
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
 
+    from semsig_gis.core import AnyCrs
     from semsig_gis.sources import GeometryKind, RawLayer
 
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
@@ -91,7 +92,7 @@ def read_surroundings(
     path: str | Path | gpd.GeoDataFrame,
     *,
     role: Literal["buildings", "streets"],
-    crs: CRS | str,
+    crs: AnyCrs,
     box: Sequence[float] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> gpd.GeoDataFrame:
@@ -105,7 +106,7 @@ def read_surroundings(
         selected by their tags. SourceError if it is missing, damaged, or of another kind.
     role : {"buildings", "streets"}
         The features: polygons or lines. InputError if there are none, or also other geometries.
-    crs : pyproj.CRS or str
+    crs : int, str or pyproj.CRS
         CRS of the result. CrsError if the CRS of the file is unknown.
     box : sequence of float, optional
         ``xmin, ymin, xmax, ymax`` in the CRS of a file by `save_surroundings`: only features with
@@ -154,7 +155,7 @@ def _with_licences(layer: RawLayer) -> gpd.GeoDataFrame:
 
 
 def read_area(
-    area: str | Path | gpd.GeoDataFrame, *, crs: CRS | str
+    area: str | Path | gpd.GeoDataFrame, *, crs: AnyCrs
 ) -> shapely.Polygon | shapely.MultiPolygon:
     """Return a box ``west,south,east,north`` in degrees, or the polygons of a file or table.
 
@@ -163,7 +164,7 @@ def read_area(
     """
     if isinstance(area, str | Path) and NUMBERS.fullmatch(str(area)):
         box = shapely.segmentize(parse_area(str(area)).polygon, EDGE_DEGREES)
-        shapes = transformed(np.array([box]), WGS84, CRS.from_user_input(crs))
+        shapes = transformed(np.array([box]), WGS84, parse_crs(crs))
     else:
         shapes = _read(area, "area", crs).geometry.to_numpy()
     joined = join_areas(shapes)
@@ -175,7 +176,7 @@ def read_area(
 def _read(
     path: str | Path | gpd.GeoDataFrame,
     role: Literal["buildings", "streets", "area"],
-    crs: CRS | str,
+    crs: AnyCrs,
     box: Sequence[float] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> gpd.GeoDataFrame:
@@ -199,7 +200,7 @@ def _read(
     if (len(table) == 0 and box is None) or len(others):
         content = f"contains a {others.iloc[0].geom_type}" if len(others) else f"contains no {kind}"
         raise InputError(f"{where} {content}; give {_of_kind(path, kind)}.")
-    return table.to_crs(crs)
+    return table.to_crs(parse_crs(crs))
 
 
 def _named(path: object) -> str:

@@ -91,6 +91,7 @@ from .rows import RowRules as RowRules
 from .rows import Rows as Rows
 from .rows import fits_the_globe as fits_the_globe
 from .rows import off_the_globe as off_the_globe
+from .rows import parse_crs as parse_crs
 from .rows import raw_layer as raw_layer
 from .rows import usable_crs as usable_crs
 from .services.gml import parse_xml as parse_xml

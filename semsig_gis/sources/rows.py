@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core import AnyCrs
     from semsig_gis.sources.filters import Value
     from semsig_gis.sources.layer_spec import LayerSpec
 
@@ -48,7 +49,7 @@ LONGITUDE_LIMIT = 180.0 + 1e-6
 LATITUDE_LIMIT = 90.0 + 1e-6
 
 
-def parse_crs(text: str) -> CRS:
+def parse_crs(text: AnyCrs) -> CRS:
     """Parse the CRS that a user gives; CrsError if it is unknown, geocentric or vertical."""
     advice = "write a code such as 'EPSG:2154' or 'EPSG:4326'"
     try:

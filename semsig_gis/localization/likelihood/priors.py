@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
+    from semsig_gis.core import AnyCrs
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.answers import PositionRecord
 
@@ -163,7 +164,7 @@ def area_prior(
     database: SignatureDatabase,
     area: shapely.Geometry,
     *,
-    crs: CRS | str | None = None,
+    crs: AnyCrs | None = None,
     outside: float = 0.0,
 ) -> NDArray[np.float64]:
     """Return the prior that the place lies in an area.
@@ -174,7 +175,7 @@ def area_prior(
         The cells.
     area : shapely.Geometry
         A polygon or multipolygon.
-    crs : pyproj.CRS or str, optional
+    crs : int, str or pyproj.CRS, optional
         Coordinate reference system of the area; that of the database by default.
     outside : float, default 0
         Chance, 0 to below 1, that the place is outside the area.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -23,6 +23,7 @@ from semsig_gis.core import (
     Displayed,
     EmptyResultError,
     InputError,
+    crs_text,
     require_metric_crs,
 )
 from semsig_gis.objects.conflation import ConflationReport, conflate
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core import Taxonomy
+    from semsig_gis.core import AnyCrs, Taxonomy
     from semsig_gis.objects.table import StreetObjects
     from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer, Role, RowCounts
 
@@ -108,7 +109,7 @@ def build_objects(
     layers: Iterable[RawLayer],
     *,
     taxonomy: Taxonomy,
-    crs: CRS | str,
+    crs: AnyCrs,
     collapse: bool = True,
     apart: Collection[str] = (),
 ) -> tuple[StreetObjects, LoadReport]:
@@ -123,7 +124,7 @@ def build_objects(
         The layers. CrsError if one has no coordinate reference system.
     taxonomy : Taxonomy
         The classes. UnknownNameError if it lacks a class of the layers.
-    crs : pyproj.CRS or str
+    crs : int, str or pyproj.CRS
         Metric coordinate reference system of the result.
     collapse : bool, default True
         Whether objects of one class at the same place (within the same centimetre) become one,
@@ -412,7 +413,7 @@ def read_files(
     paths: Iterable[str | Path],
     *,
     filters: bool = True,
-    crs: str | None = None,
+    crs: AnyCrs | None = None,
     area: Area | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[RawLayer, ...], tuple[LayerSpec, ...]]:
@@ -427,8 +428,8 @@ def read_files(
         cannot be read.
     filters : bool, default True
         Whether the filters of the layers are applied.
-    crs : str, optional
-        CRS of files that do not state one.
+    crs : int, str or pyproj.CRS, optional
+        CRS of files that do not state one, such as 2154, its EPSG code.
     area : Area, optional
         Parts of large files outside this area need not be read (see `clip_layers`).
     progress : callable, optional
@@ -469,8 +470,9 @@ def read_files(
     layers: list[RawLayer] = []
     for count, ((name, sources), group_specs) in enumerate(specs_of.items(), start=1):
         source = sources if len(sources) > 1 else sources[0]
-        options = {"area": area} if READERS[name].pruning else {}
-        layers.extend(reader(name)(source, group_specs, filters=filters, crs=crs, **options))
+        options: dict[str, Any] = {"area": area} if READERS[name].pruning else {}
+        options["crs"] = None if crs is None else crs_text(crs)
+        layers.extend(reader(name)(source, group_specs, filters=filters, **options))
         if progress is not None:
             progress(count, len(specs_of))
     order = {spec.name: number for number, spec in enumerate(specs)}
@@ -481,7 +483,7 @@ def assemble(
     layers: Sequence[RawLayer],
     catalog: Catalog,
     *,
-    metric_crs: str | None = None,
+    metric_crs: AnyCrs | None = None,
     collapse: bool = True,
     merge: bool = True,
     counted: Sequence[RawLayer] = (),
@@ -496,7 +498,7 @@ def assemble(
         Layers that were read or fetched.
     catalog : Catalog
         Catalogue with the classes, the metric CRS and the radii for merging.
-    metric_crs : str, optional
+    metric_crs : int, str or pyproj.CRS, optional
         Metric CRS; by default that of the catalogue, or else the UTM zone of the data.
     collapse : bool, default True
         Whether objects of one class at the same place become one.
