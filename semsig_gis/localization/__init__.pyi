@@ -83,6 +83,7 @@ from .likelihood.locate import Location as Location
 from .likelihood.locate import locate as locate
 from .likelihood.locate import locate_in_areas as locate_in_areas
 from .likelihood.locate import locate_route as locate_route
+from .likelihood.locate import locate_versions as locate_versions
 from .likelihood.location_record import LocationRecord as LocationRecord
 from .likelihood.location_record import PlaceRecord as PlaceRecord
 from .likelihood.location_record import PriorRecord as PriorRecord

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from typing_extensions import TypedDict
 
+from semsig_gis.core import BEARING_UNITS, FULL_TURN
 from semsig_gis.localization.likelihood.priors import weight_prior
+from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,10 +22,16 @@ if TYPE_CHECKING:
     from semsig_gis.core import ObjectClass, Signature
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.locate import LikelihoodLocator, Location
+    from semsig_gis.localization.noise.table import NoiseTable
+    from semsig_gis.observation import Photo
 
 
 LOOKED_FOR = 0.95
 """Minimum probability that a person who looks for an object detects it."""
+EDGE = 5.0
+"""Degrees at each edge of a photo in which objects do not count: its heading is only estimated."""
+MOST_CELLS = 20_000
+"""Likeliest cells whose part in the sectors of a view is compared."""
 
 QuestionRecord = TypedDict(
     "QuestionRecord",
@@ -51,6 +59,8 @@ class ClassQuestion:
         Visibility range of the class.
     more : bool
         Whether the query has an object of the class already: the question is about another one.
+    in_view : bool
+        Whether the question is only about the sectors that the query looked at.
     chance : float
         Probability that the answer is yes.
     gain : float
@@ -69,6 +79,7 @@ class ClassQuestion:
     item: ObjectClass
     metres: float
     more: bool
+    in_view: bool
     chance: float
     gain: float
 
@@ -77,7 +88,8 @@ class ClassQuestion:
         """The question in words."""
         title = self.item.title.lower()
         article = "another" if self.more else "an" if title[0] in "aeiou" else "a"
-        return f"Is there {article} {title} within {self.metres:g} m?"
+        where = "in view, " if self.in_view else ""
+        return f"Is there {article} {title} {where}within {self.metres:g} m?"
 
     def to_dict(self) -> QuestionRecord:
         """Return plain values for JSON."""
@@ -119,7 +131,8 @@ def next_questions(
     Notes
     -----
     The gain is the mutual information of the answer, yes or no, and the cell: the entropy of the
-    answer, minus its mean entropy if the cell is known. Missed and false detections reduce it.
+    answer, minus its mean entropy if the cell is known. Missed and false detections reduce it. Of a
+    query with sectors, only objects in them count, at the likeliest heading in each cell.
 
     Examples
     --------
@@ -131,22 +144,30 @@ def next_questions(
     (True, True)
     """
     database, table = index.database, index.table
-    types = database.type_sequences
-    # Cells with one type sequence give the same answer.
-    weights = np.bincount(types.inverse, location.chances, minlength=len(types))
-    counts = _class_counts(location.query, unplaced)
+    view = location.grid_query
+    if in_view := _has_sectors(view):
+        cells = location.posterior.likeliest(MOST_CELLS)
+        sights = _Sights.in_sectors(index, View.of(view), location.headings, cells)
+        weights = location.chances[cells] / location.chances[cells].sum()
+    else:
+        # Cells with one type sequence give the same answer.
+        types = database.type_sequences
+        sights = _Sights.all_round(index, view)
+        weights = np.bincount(types.inverse, location.chances, minlength=len(types))
+    sights.counts.update(code for code in unplaced if code in table.codes)
     questions = []
     for code in table.codes.tolist():
         if code in absent:
             continue
-        yes = _yes_chances(index, code, counts[code], least=LOOKED_FOR)
+        yes = sights.yes_chances(code, least=LOOKED_FOR)
         chance = float(weights @ yes)
         item = database.taxonomy.by_code(code)
         questions.append(
             ClassQuestion(
                 item=item,
                 metres=database.spec.radius if item.range_m is None else item.range_m,
-                more=bool(counts[code]),
+                more=bool(sights.counts[code]),
+                in_view=in_view,
                 chance=chance,
                 gain=max(float(_entropy(chance)) - float(weights @ _entropy(yes)), 0.0),
             )
@@ -160,6 +181,7 @@ def unplaced_prior(
     unplaced: Sequence[int] = (),
     *,
     absent: Sequence[int] = (),
+    headings: Sequence[NDArray[np.float32] | None] = (None,),
 ) -> NDArray[np.float64]:
     """Return a prior from objects that were seen in an unknown direction, or are not in sight.
 
@@ -172,7 +194,10 @@ def unplaced_prior(
     unplaced : sequence of int
         Class codes of objects that were seen in addition, in an unknown direction.
     absent : sequence of int, optional
-        Class codes that were looked for: no more objects of these classes are in sight.
+        Class codes that were looked for: no more objects of these classes are in sight, or of a
+        query with sectors, in these sectors.
+    headings : sequence of ndarray or None, optional
+        By photo, the degrees to add to its bearings in each cell; None if they are known.
 
     Returns
     -------
@@ -188,17 +213,19 @@ def unplaced_prior(
     >>> bool(np.exp(prior).sum().round(9) == 1)
     True
     """
-    database = index.database
-    counts = _class_counts(query)
-    weights = np.ones(len(database.type_sequences))
-    for code in unplaced:
-        if code in index.table.codes:  # classes that the map lacks are not used
-            weights *= _yes_chances(index, code, counts[code])
-        counts[code] += 1
-    for code in absent:
-        if code in index.table.codes:
-            weights *= 1.0 - _yes_chances(index, code, counts[code], least=LOOKED_FOR)
-    return weight_prior(database, weights[database.type_sequences.inverse])
+    database, inverse = index.database, index.database.type_sequences.inverse
+    used = set(index.table.codes.tolist())  # classes that the map lacks are not used
+    sights = _Sights.all_round(index, query)
+    weights = np.ones(len(database))
+    for code in filter(used.__contains__, unplaced):
+        weights *= sights.yes_chances(code)[inverse]
+        sights.counts[code] += 1
+    if _has_sectors(query):
+        inverse = np.arange(len(database))
+        sights = _Sights.in_sectors(index, View.of(query), headings, inverse)
+    for code in filter(used.__contains__, absent):
+        weights *= 1.0 - sights.yes_chances(code, least=LOOKED_FOR)[inverse]
+    return weight_prior(database, weights)
 
 
 def with_unplaced(
@@ -212,7 +239,9 @@ def with_unplaced(
     if not unplaced and not absent:
         return locator
     by_code = locator.index.database.taxonomy.by_code
-    prior = unplaced_prior(locator.index, query, unplaced, absent=absent)
+    grid_query = locator.north.to_grid(query)
+    headings = locator.scan(query).headings if absent and _has_sectors(query) else (None,)
+    prior = unplaced_prior(locator.index, grid_query, unplaced, absent=absent, headings=headings)
     used = locator.index.table.codes
     titles = {
         name: [
@@ -229,24 +258,89 @@ def with_unplaced(
     )
 
 
-def _class_counts(query: Signature, unplaced: Sequence[int] = ()) -> Counter[int]:
-    """Return the number of objects of each class in a query."""
-    return Counter([*([] if query.codes is None else query.codes.tolist()), *unplaced])
+def _has_sectors(query: Signature) -> bool:
+    """Whether a query looked at less than the full turn."""
+    return any(photo.sectors for photo in View.of(query).photos)
 
 
-def _yes_chances(
-    index: LikelihoodIndex, code: int, count: int, *, least: float = 0.0
-) -> NDArray[np.float64]:
-    """Return the probability, by type sequence, that more than `count` of a class are detected.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Sights:
+    """The objects that are looked at from some places, and those of the query.
 
-    `least` is the minimum probability to detect an object in sight.
+    `histogram` has the number of objects by place and class of the noise table, `lengths` the
+    number of objects all around by place, `counts` the objects of the query by class, and `share`
+    is the part of the full turn that is looked at.
     """
-    table, types = index.table, index.database.type_sequences
-    row = int(np.flatnonzero(table.codes == code)[0])
-    false = 1.0 - math.exp(-float(table.clutter[row]))
-    detected = np.maximum(table.detected[table.length_rows(types.lengths), row], least)
-    detected = 1.0 - (1.0 - detected) * (1.0 - false)
-    return np.where(types.histogram[:, code] > count, detected, false)
+
+    table: NoiseTable
+    histogram: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    counts: Counter[int]
+    share: float = 1.0
+
+    @classmethod
+    def all_round(cls, index: LikelihoodIndex, query: Signature) -> _Sights:
+        """Return what is seen all around, by type sequence."""
+        types, table = index.database.type_sequences, index.table
+        return cls(
+            table=table,
+            histogram=types.histogram[:, table.codes],
+            lengths=types.lengths,
+            counts=Counter([] if query.codes is None else query.codes.tolist()),
+        )
+
+    @classmethod
+    def in_sectors(
+        cls,
+        index: LikelihoodIndex,
+        view: View,
+        headings: Sequence[NDArray[np.float32] | None],
+        cells: NDArray[np.int64],
+    ) -> _Sights:
+        """Return what is in the sectors of a view, by cell."""
+        database, table = index.database, index.table
+        starts = database.offsets[cells]
+        lengths = database.offsets[cells + 1] - starts
+        places = np.repeat(np.arange(len(cells)), lengths)
+        rows = np.arange(len(places)) + np.repeat(starts - np.cumsum(lengths) + lengths, lengths)
+        bearings = database.bearing_units[rows] * (FULL_TURN / BEARING_UNITS)
+        seen, marked = np.zeros(len(rows), np.bool_), np.zeros(len(view), np.bool_)
+        for number, photo in enumerate(view.photos):
+            inner = _without_edges(photo)
+            turns = headings[number] if number < len(headings) else None
+            turn = 0.0 if turns is None else turns[cells][places]
+            seen |= inner.sees(bearings - turn)
+            marked |= (view.photo_rows == number) & inner.sees(view.bearings)
+        kinds = table.row_of[database.codes[rows[seen]]]
+        size = len(table.codes)
+        counted = np.bincount(places[seen] * size + kinds, minlength=len(cells) * size)
+        return cls(
+            table=table,
+            histogram=counted.reshape(-1, size),
+            lengths=lengths,
+            counts=Counter([] if view.codes is None else view.codes[marked].tolist()),
+            share=min(sum(photo.width for photo in view.photos) / FULL_TURN, 1.0),
+        )
+
+    def yes_chances(self, code: int, *, least: float = 0.0) -> NDArray[np.float64]:
+        """Return the probability, by place, that more of a class are detected than in the query.
+
+        `least` is the minimum probability to detect an object in sight.
+        """
+        table, row = self.table, int(self.table.row_of[code])
+        false = 1.0 - math.exp(-float(table.clutter[row]) * self.share)
+        detected = np.maximum(table.detected[table.length_rows(self.lengths), row], least)
+        detected = 1.0 - (1.0 - detected) * (1.0 - false)
+        return np.where(self.histogram[:, row] > self.counts[code], detected, false)
+
+
+def _without_edges(photo: Photo) -> Photo:
+    """Return a photo with its sectors smaller by `EDGE` degrees, or a quarter, at each side."""
+    sectors = []
+    for low, high in photo.sectors:
+        edge = min(EDGE, (high - low) / 4.0)
+        sectors.append((low + edge, high - edge))
+    return replace(photo, sectors=tuple(sectors))
 
 
 def _entropy(chance: Any) -> Any:  # noqa: ANN401 - a number or an array

@@ -1,5 +1,7 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
+from .detectors.camera import POSSIBLE_FOV as POSSIBLE_FOV
+from .detectors.camera import USUAL_FOV as USUAL_FOV
 from .detectors.camera import Camera as Camera
 from .detectors.camera import Projection as Projection
 from .detectors.exif import picture_shot as picture_shot

@@ -31,6 +31,8 @@ from semsig_gis.observation import (
     DEGREE_DIGITS,
     ERROR_DIGITS,
     METRE_DIGITS,
+    POSSIBLE_FOV,
+    USUAL_FOV,
     Camera,
     Leg,
     View,
@@ -48,6 +50,10 @@ if TYPE_CHECKING:
 MarkNumber = tuple[int, int, int]
 """Indices of a view of the page, of a photo in this view, and of a mark in this photo."""
 
+_MarkedPhoto = tuple[View, tuple[MarkNumber, ...], float]
+"""A photo, the mark of each of its objects, and its weight (see `Camera.log_scale`)."""
+
+MIDDLE_FOV = POSSIBLE_FOV[len(POSSIBLE_FOV) // 2]
 STEP_ERROR = 0.2
 """Relative standard deviation of the length of a step without a stated error."""
 MOST_TOP, MOST_PHOTOS, MOST_MARKS = 100, 20, 200
@@ -100,7 +106,7 @@ class _PhotoMark(_Seen):
 
 
 class PagePhoto(FileTable, extra="ignore"):
-    """A photo of the page; only one with marks needs a size and a field of view."""
+    """A photo of the page; only one with marks needs a size. Without `fov` it is unknown."""
 
     name: str | None = None
     width: _Side | None = None
@@ -111,19 +117,21 @@ class PagePhoto(FileTable, extra="ignore"):
     heading_error: Any = None
     marks: Annotated[tuple[_PhotoMark, ...], length(0, MOST_MARKS)] = ()
 
+    def camera(self, unknown_fov: float) -> Camera:
+        """Return the camera, with another field of view if its own is unknown.
+
+        InputError if its size is missing or its field of view does not fit.
+        """
+        if self.width is None or self.height is None:
+            raise InputError("the width or height of a photo is missing; give pixels.")
+        projection = self.projection or "pinhole"
+        fov = USUAL_FOV.get(str(projection), unknown_fov) if self.fov is None else self.fov
+        return Camera(width=self.width, height=self.height, fov=fov, projection=projection)
+
     @property
-    def camera(self) -> Camera:
-        """The camera; InputError if its size or field of view is missing or does not fit."""
-        if self.width is None or self.height is None or self.fov is None:
-            raise InputError(
-                "the width, height or field of view of a photo is missing; give pixels and degrees."
-            )
-        return Camera(
-            width=self.width,
-            height=self.height,
-            fov=self.fov,
-            projection=self.projection or "pinhole",
-        )
+    def fov_unknown(self) -> bool:
+        """Whether it has marks, and no field of view."""
+        return bool(self.marks) and self.fov is None and self.projection in {None, "pinhole"}
 
 
 class _Step(FileTable, extra="ignore"):
@@ -192,14 +200,18 @@ class _PageQuestion(FileTable, extra="ignore"):
 class Question:
     """Views from one or several places, and the options of their answer.
 
-    `views` holds one view per place, `marks` the mark of each of its objects, and `legs` the ways
-    between the places; `place_number` is the place to localize. No more objects of the classes with
+    `versions` holds, for each field of view that photos of an unknown one may have (`fovs`, empty
+    if there are none), one view per place, `marks` likewise the mark of each object of a view, and
+    `log_weights` the weight of each view (see `Camera.log_scale`). `legs` are the ways between the
+    places; `place_number` is the place to localize. No more objects of the classes with
     the codes `absent` are visible from the first place; it is `near` a known place, given in the
     words of `semsig localize`. A `quick` answer uses only the cells.
     """
 
-    views: tuple[View, ...]
-    marks: tuple[tuple[MarkNumber, ...], ...]
+    versions: tuple[tuple[View, ...], ...]
+    marks: tuple[tuple[tuple[MarkNumber, ...], ...], ...]
+    log_weights: tuple[tuple[float, ...], ...]
+    fovs: tuple[float, ...]
     legs: tuple[Leg, ...]
     place_number: int
     top: int
@@ -214,28 +226,27 @@ class Question:
     def parse(cls, value: object, *, taxonomy: Taxonomy, radius: float) -> Question:
         """Parse the JSON of a page; InputError or UnknownNameError if it is not a question."""
         page = read_table(_PageQuestion, value, "the question", error=InputError)
-        places: list[list[tuple[View, list[MarkNumber]]]] = []
-        steps: list[Leg] = []
-        place_of_view: list[int] = []
-        for index, row in enumerate(page.views):
-            # A view with a step is from a new place, others join the place before.
-            if index and row.step is not None:
-                steps.append(_leg(row.step))
-            if not index or row.step is not None:
-                places.append([])
-            places[-1] += _photos(row, index, taxonomy, radius)
-            place_of_view.append(len(places) - 1)
+        unknown = any(photo.fov_unknown for row in page.views for photo in row.photos)
+        fovs = POSSIBLE_FOV if unknown else ()
+        versions = [_places(page.views, taxonomy, radius, fov) for fov in fovs or (MIDDLE_FOV,)]
+        places = versions[0]
+        # A view with a step is from a new place, others join the place before.
+        new = [bool(index and row.step is not None) for index, row in enumerate(page.views)]
+        steps = [_leg(row.step) for row in page.views[1:] if row.step is not None]
+        place_of_view = np.cumsum(new).tolist()
         if not any(places):
             raise InputError("nothing is marked yet; mark an object that you see.")
-        views, marks = zip(*(_merged_view(photos) for photos in places if photos), strict=True)
+        merged = [[_merged_view(photos) for photos in version if photos] for version in versions]
         legs, place_numbers = _legs(places, steps)
         last = len(page.views) - 1
         view = last if page.view is None else page.view
         if view > last:
             raise InputError(f"view {view} is not there; give a number from 0 to {last}.")
         return cls(
-            views=views,
-            marks=marks,
+            versions=tuple(tuple(view for view, _, _ in version) for version in merged),
+            marks=tuple(tuple(marks for _, marks, _ in version) for version in merged),
+            log_weights=tuple(tuple(weight for _, _, weight in version) for version in merged),
+            fovs=fovs,
             legs=legs,
             place_number=place_numbers[place_of_view[view]],
             top=page.top,
@@ -247,28 +258,33 @@ class Question:
             quick=page.quick is True,
         )
 
-    def rows(self, taxonomy: Taxonomy) -> list[dict[str, Any]]:
-        """Return the views as rows of JSON lines for `semsig localize --queries`."""
-        rows = [dict[str, Any](view.to_dict(taxonomy)) for view in self.views]
+    def rows(self, taxonomy: Taxonomy, version: int = 0) -> list[dict[str, Any]]:
+        """Return the views of a version as rows of JSON lines for `semsig localize --queries`."""
+        rows = [dict[str, Any](view.to_dict(taxonomy)) for view in self.versions[version]]
         for row, leg in zip(rows[1:], self.legs, strict=True):
             row |= {"dx": leg.dx, "dy": leg.dy, "sigma": leg.sigma}
         return rows
 
-    def command(self, taxonomy: Taxonomy, **options: Any) -> str:  # noqa: ANN401 - any fields
-        """Return the command line with the same answer; `options` are the database and others."""
-        rows = self.rows(taxonomy)
+    def command(self, taxonomy: Taxonomy, version: int = 0, **options: Any) -> str:  # noqa: ANN401 - any fields
+        """Return the command line with the same answer; `options` are the database and others.
+
+        Of an unknown field of view, it is the command for one version, with a remark.
+        """
+        rows = self.rows(taxonomy, version)
         options |= {"on_grid": self.seen_from == "cells", "near": self.near, "top": self.top}
+        remark = f"  # if the field of view is {self.fovs[version]:g} degrees" if self.fovs else ""
         absent = ", ".join(f"no {taxonomy.by_code(code).title.lower()}" for code in self.absent)
         view_options = _view_options(rows[0]) if len(rows) == 1 else None
         if view_options is not None:
-            return command_line(Localize(**options, seen=absent or None, **view_options))
+            words = command_line(Localize(**options, seen=absent or None, **view_options))
+            return words + remark
         # Other views have no options of their own: pipe them as JSON lines.
         lines = shlex.join(["printf", "%s\\n", *map(json.dumps, rows)])
         if len(rows) == 1:
             words = command_line(Localize(**options, queries="-"))
         else:
             words = f"{command_line(Route(**options, views='-'))} --json"
-        return f"{lines} | {words}" + (f"  # without: {absent}" if absent else "")
+        return f"{lines} | {words}{remark}" + (f"  # without: {absent}" if absent else "")
 
 
 def _near_text(lat: float, lon: float, metres: float) -> str:
@@ -279,14 +295,27 @@ def _near_text(lat: float, lon: float, metres: float) -> str:
     )
 
 
+def _places(
+    rows: Sequence[_PageView], taxonomy: Taxonomy, radius: float, fov: float
+) -> list[list[_MarkedPhoto]]:
+    """Return the photos with marks of each place, with a field of view if theirs is unknown."""
+    places: list[list[_MarkedPhoto]] = []
+    for index, row in enumerate(rows):
+        if not index or row.step is not None:
+            places.append([])
+        places[-1] += _photos(row, index, taxonomy, radius, fov)
+    return places
+
+
 def _photos(
-    row: _PageView, view: int, taxonomy: Taxonomy, radius: float
-) -> list[tuple[View, list[MarkNumber]]]:
-    """Return each photo of a view that has marks, and the numbers of the marks by object."""
+    row: _PageView, view: int, taxonomy: Taxonomy, radius: float, fov: float
+) -> list[_MarkedPhoto]:
+    """Return each photo of a view that has marks."""
     photos = []
     items: tuple[_PageView | PagePhoto, ...] = row.photos if row.compass is None else (row,)
     for index, photo in enumerate(items):
         detections: list[dict[str, Any]]
+        weight = 0.0
         if isinstance(photo, _PageView):
             error = photo.heading_error
             detections = [mark.model_dump(by_alias=True) for mark in photo.compass or ()]
@@ -295,8 +324,10 @@ def _photos(
             # Bearings of marks are relative to the middle of the photo, which looks at the heading.
             middle = photo.heading or 0.0
             error = "unknown" if photo.heading is None else photo.heading_error
-            camera = photo.camera
+            camera = photo.camera(fov)
             detections = _detections(camera, photo.marks, taxonomy)
+            if photo.fov_unknown:
+                weight = camera.log_scale([detection["offset"] for detection in detections])
             for detection in detections:
                 turned = float(wrap_degrees(middle + detection.pop("offset")))
                 detection["bearing"] = round(turned, DEGREE_DIGITS) % FULL_TURN
@@ -315,7 +346,8 @@ def _photos(
         # The order in which the view sorts its objects.
         bearings = np.array([detection["bearing"] for detection in detections], np.float64)
         order = np.argsort(wrap_degrees(bearings), kind="stable").tolist()
-        photos.append((view_of_photo, [(view, index, mark) for mark in order]))
+        numbers = tuple((view, index, mark) for mark in order)
+        photos.append((view_of_photo, numbers, weight))
     return photos
 
 
@@ -385,16 +417,15 @@ def _legs(
     return tuple(legs), numbers
 
 
-def _merged_view(
-    photos: Sequence[tuple[View, list[MarkNumber]]],
-) -> tuple[View, tuple[MarkNumber, ...]]:
-    """Return the photos of one place as one view, and the marks by object."""
+def _merged_view(photos: Sequence[_MarkedPhoto]) -> _MarkedPhoto:
+    """Return the photos of one place as one view."""
     if len(photos) == 1:
-        return photos[0][0], tuple(photos[0][1])
-    view = View.joined([view for view, _ in photos])
-    marks = [mark for _, photo_marks in photos for mark in photo_marks]
+        return photos[0]
+    view = View.joined([view for view, _, _ in photos])
+    marks = [mark for _, photo_marks, _ in photos for mark in photo_marks]
     order: NDArray[np.int64] = np.argsort(wrap_degrees(np.asarray(view.bearings)), kind="stable")
-    return view.turned(0.0), tuple(marks[row] for row in order.tolist())
+    weight = sum(weight for _, _, weight in photos)
+    return view.turned(0.0), tuple(marks[row] for row in order.tolist()), weight
 
 
 def _leg(step: _Step) -> Leg:

@@ -68,6 +68,7 @@ from semsig_gis.output import (
     to_metres,
 )
 from semsig_gis.serve.question import (
+    MIDDLE_FOV,
     PageBoxes,
     PagePlace,
     PageSimulation,
@@ -320,7 +321,9 @@ class Workbench:
         start = time.perf_counter()
         question, location = self._located(body)
         drawing = answer_drawing(location)
-        marks, table = question.marks[question.place_number], self._index(question).table
+        version = int(np.argmax(location.versions))
+        marks = question.marks[version][question.place_number]
+        table = self._index(question).table
         codes = {item.name: item.code for item in self.database.taxonomy.classes}
         for candidate in drawing["candidates"]:
             rays = candidate["rays"]
@@ -329,6 +332,7 @@ class Workbench:
             candidate["for_against"] = place_reasons(rays, codes, table=table, shares=self._shares)
         command = question.command(
             self.taxonomy,
+            version,
             database=self.city.path,
             noise=self._noise(question),
             objects=self.objects,
@@ -337,7 +341,8 @@ class Workbench:
             "region": self._region(location),
             "truth": None if question.truth is None else self._truth(location, question.truth),
             "command": command,
-            "views": question.rows(self.taxonomy),
+            "views": question.rows(self.taxonomy, version),
+            "fov": question.fovs[version] if question.fovs else None,
             "quick": self._is_quick(question),
             "seconds": time.perf_counter() - start,
         }
@@ -423,7 +428,8 @@ class Workbench:
             top=question.top,
             explained=question.top,
         )
-        locator = replace(locator, incremental=self._incremental)
+        if len(question.versions) == 1:
+            locator = replace(locator, incremental=self._incremental)
         if self._is_quick(question):
             locator = replace(locator, refined=False, quick=True, explained=QUICKLY_EXPLAINED)
         if question.near is not None:
@@ -431,7 +437,8 @@ class Workbench:
             prior = position_prior(self.database, (place.x, place.y), sigma=place.sigma)
             locator = replace(locator, log_prior=prior, surely_here=True)
             locator = replace(locator, known={"near": place.to_dict()})
-        return with_unplaced(locator, question.views[0], absent=question.absent)
+        # Of an unknown field of view, what is absent is absent from the narrowest for sure.
+        return with_unplaced(locator, question.versions[0][0], absent=question.absent)
 
     def _is_quick(self, question: Question) -> bool:
         """Whether the answer skips the slow steps, which only exist for places anywhere."""
@@ -440,7 +447,7 @@ class Workbench:
     def _located(self, body: object) -> tuple[Question, Location]:
         """Return a question and its answer; the last answer is cached."""
         question = Question.parse(body, taxonomy=self.taxonomy, radius=self.database.spec.radius)
-        rows = question.rows(self.taxonomy)
+        rows = [question.rows(self.taxonomy, version) for version in range(len(question.versions))]
         setting = self._noise(question), question.seen_from
         hints = question.absent, question.near
         key = rows, *setting, *hints, question.top, self._is_quick(question)
@@ -448,22 +455,29 @@ class Workbench:
             locator = self._locator(question)
             # Reuse the scores of views that did not change since the last question.
             cache: dict[str, CellScores] = {}
-            scores: list[CellScores] = []
-            names = [json.dumps([*setting, view.to_dict(self.taxonomy)]) for view in question.views]
-            for number, (name, view) in enumerate(zip(names, question.views, strict=True)):
-                # Hints are about the first place only.
-                view_hints, prior = ((), None) if number else (hints, locator.log_prior)
-                scanned = self._scores.get(name) or locator.scan(view)
-                score_key = json.dumps([name, view_hints, locator.quick])
-                best = self._scores.get(score_key) or locator.scores(view, prior, scanned=scanned)
-                cache |= {name: scanned, score_key: best}
-                scores.append(best)
+            scores: list[list[CellScores]] = []
+            firsts: list[CellScores] = []
+            for views in question.versions:
+                names = [json.dumps([*setting, view.to_dict(self.taxonomy)]) for view in views]
+                scores.append([])
+                for number, (name, view) in enumerate(zip(names, views, strict=True)):
+                    # Hints are about the first place only.
+                    view_hints, prior = ((), None) if number else (hints, locator.log_prior)
+                    scanned = self._scores.get(name) or locator.scan(view)
+                    score_key = json.dumps([name, view_hints, locator.quick])
+                    best = self._scores.get(score_key)
+                    best = best or locator.scores(view, prior, scanned=scanned)
+                    cache |= {name: scanned, score_key: best}
+                    scores[-1].append(best)
+                firsts.append(cache[names[0]])
             self._scores = cache
-            views, first = question.views, cache[names[0]]
-            if question.legs:
-                locations = locator.locate_route(views, question.legs, scores=scores, scanned=first)
-            else:
-                locations = (locator.locate(views[0], scores=scores[0], scanned=first),)
+            locations = locator.locate_versions(
+                question.versions,
+                question.legs,
+                log_weights=question.log_weights,
+                scores=scores,
+                scanned=firsts,
+            )
             self._last = key, locations
         return question, self._last[1][question.place_number]
 
@@ -550,7 +564,7 @@ class Workbench:
 
 def _shot(photo: PagePhoto) -> Shot:
     """Return the camera and heading of a photo of the page."""
-    camera = photo.camera
+    camera = photo.camera(MIDDLE_FOV)
     return Shot(
         camera=camera.projection,
         fov=camera.fov,

@@ -296,7 +296,7 @@ def test_marks_keep_their_numbers_in_sorted_views(bench: Workbench) -> None:
     # Two marks on one bearing.
     photos[0]["marks"].append(dict(photos[0]["marks"][2]))
     question = Question.parse({"views": [{"photos": photos}]}, taxonomy=bench.taxonomy, radius=30.0)
-    (view,), (numbers,) = question.views, question.marks
+    ((view,),), ((numbers,),) = question.versions, question.marks
     assert sorted(numbers) == [(0, n, m) for n in range(3) for m in range(len(photos[n]["marks"]))]
     camera = Camera(width=WIDTH, height=HEIGHT, fov=FOV)
     for bearing, (_, row, mark) in zip(parts_of(view)[1].tolist(), numbers, strict=True):
@@ -333,7 +333,6 @@ def test_marks_keep_their_numbers_in_sorted_views(bench: Workbench) -> None:
         ({"truth": [1]}, "truth = [1]; give latitude and longitude"),
         ({"truth": [100, 3]}, "from -90 to 90"),
         ({"fov": 300}, "field of view"),
-        ({"fov": None}, "field of view"),
         ({"projection": "flat"}, "flat"),
         ({"heading": "north"}, "heading"),
         ({"heading_error": "huge"}, "heading_error"),
@@ -380,7 +379,7 @@ def test_saved_question_may_lack_values(*, quick: object) -> None:
         {"views": [{"photos": photos}], "quick": quick}, taxonomy=paper_taxonomy(), radius=30.0
     )
     assert not question.quick
-    assert len(question.views) == 1
+    assert [len(views) for views in question.versions] == [1]
 
 
 def test_detector_boxes_become_marks(page: Page) -> None:
@@ -405,7 +404,7 @@ def test_detector_boxes_become_marks(page: Page) -> None:
         ({"name": "boxes.exe"}, "format"),
         ({"labels": ["nowhere"]}, "nowhere"),
         ({"photos": [{**SIDE, "name": "z.jpg", "fov": FOV}]}, "a.jpg"),
-        ({"photos": [SIDE]}, "field of view"),
+        ({"photos": [{}]}, "width"),
     ):
         page.refused("/api/boxes", body | change, word)
 
@@ -433,6 +432,43 @@ def test_suggestions_are_questions_by_gain(page: Page) -> None:
     assert by_name["street_light"] == "Is there another street light within 30 m?"
     assert by_name["indicator"] == "Is there an indicator within 30 m?"
     assert len(by_name) == len(page.bench.database.present_codes)
+
+
+def test_unknown_field_of_view_is_summed_over(page: Page, bench: Workbench) -> None:
+    cell = longest(bench)
+    known = photo(bench, cell, 0.0, fov=FOV, heading=None)
+    unknown = {**known, "fov": None}
+    certain = page.ask("/api/answer", {"views": [{"photos": [known]}]})
+    answer = page.ask("/api/answer", {"views": [{"photos": [unknown]}]})
+    assert certain["fov"] is None
+    # The likeliest of the fields of view is the true one.
+    assert answer["fov"] == FOV
+    assert answer["entropy"] >= certain["entropy"]
+    assert answer["candidates"][0]["cell_id"] == certain["candidates"][0]["cell_id"]
+    assert answer["command"].endswith("# if the field of view is 100 degrees")
+    # A photo of known field of view decides nothing about the others.
+    other = page.ask("/api/answer", {"views": [{"photos": [{**unknown, "marks": []}, known]}]})
+    assert other["fov"] is None
+
+
+def test_questions_about_a_photo_are_about_its_sector(page: Page, bench: Workbench) -> None:
+    cell = longest(bench)
+    seen = photo(bench, cell, 0.0)
+    body = {"views": [{"photos": [seen]}]}
+    suggestions = page.ask("/api/suggest", body)
+    by_name = {item["class"]: item["question"] for item in suggestions}
+    assert by_name["indicator"] == "Is there an indicator in view, within 30 m?"
+    # Nothing more is in the photo than what is marked, whatever is behind the camera.
+    row = bench.database.select(slice(cell, cell + 1))
+    away = (np.asarray(row.bearings) + 180.0) % 360.0 - 180.0
+    behind = {int(code) for code in np.asarray(row.codes)[np.abs(away) > 60.0]}
+    absent = [item.name for item in bench.taxonomy.classes if item.code in behind]
+    assert absent
+    chances = {item["class"]: item["chance"] for item in suggestions}
+    assert max(chances[name] for name in absent) < 0.5
+    before = page.ask("/api/answer", body)["candidates"][0]
+    after = page.ask("/api/answer", {**body, "absent": absent})["candidates"][0]
+    assert after["cell_id"] == before["cell_id"] == bench.database.cell_ids[cell]
 
 
 def test_cell_request_returns_the_view_from_its_middle(page: Page) -> None:
@@ -532,5 +568,5 @@ def test_steps_over_a_view_without_marks_are_added(
     ]
     question = Question.parse({"views": views}, taxonomy=bench.taxonomy, radius=30.0)
     assert [(leg.dx, leg.dy) for leg in question.legs] == [pytest.approx(leg) for leg in legs]
-    assert len(question.views) == pattern.count("1")
+    assert [len(views) for views in question.versions] == [pattern.count("1")]
     assert question.place_number == place

@@ -11,7 +11,7 @@ import math
 import time
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
@@ -36,16 +36,15 @@ from semsig_gis.localization.likelihood.elsewhere import (
 )
 from semsig_gis.localization.likelihood.estimate import cell_estimate, refined_estimate
 from semsig_gis.localization.likelihood.explain import explain, explain_cell
-from semsig_gis.localization.likelihood.index import CellScores
+from semsig_gis.localization.likelihood.index import CellScores, photo_power
 from semsig_gis.localization.likelihood.posterior import (
     DIVIDED_PARTS,
-    posterior,
     prior_ratio,
     refine,
 )
 from semsig_gis.localization.likelihood.route import route_posteriors
 from semsig_gis.localization.noise.model import cell_noise, place_noise
-from semsig_gis.observation import GRID_NORTH
+from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -71,6 +70,16 @@ MOST_PLACES = 100
 """Most places of a region that are counted."""
 ROUNDING = 1e-9
 TINY = np.finfo(np.float64).tiny
+LEAST_REFINED = 0.02
+"""Least chance of a version of a query whose place is searched between the viewpoints."""
+
+
+class _Version(NamedTuple):
+    """A version of a query, its scores, and the chances of the cells if it is right."""
+
+    query: Signature
+    scores: CellScores
+    posterior: Posterior
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -116,6 +125,10 @@ class Location(Answer):
     fit : float or None
         Share of simulated views from the best place that fit it worse than the query; None if not
         computed. Below 0.01, the query fits badly.
+    headings : tuple of ndarray or None
+        By photo, the degrees to add to its bearings in each cell; None where they are known.
+    versions : tuple of float
+        Chance of each version of the query (see `locate_versions`); `query` is the likeliest.
 
     Examples
     --------
@@ -138,6 +151,8 @@ class Location(Answer):
     prior_ratio: float | None = None
     elsewhere: float = 0.0
     fit: float | None = None
+    headings: tuple[NDArray[np.float32] | None, ...] = (None,)
+    versions: tuple[float, ...] = (1.0,)
 
     def _facts(self) -> dict[str, object]:
         sure = self.answer.given
@@ -315,58 +330,83 @@ class LikelihoodLocator:
                 "searching between the viewpoints needs the object store of the database; give it."
             )
 
-    def locate(
-        self,
-        query: Signature,
-        *,
-        top: int | None = None,
-        scores: CellScores | None = None,
-        scanned: CellScores | None = None,
-    ) -> Location:
-        """Locate a query, from its `scores` or the result `scanned` of `scan` if they are known."""
-        scores = scores or self.scores(query, self.log_prior, scanned=scanned)
-        chances = posterior(self.index.database, scores.loglik, log_prior=self.log_prior)
-        store, ratio = self._store_for([query]), None
-        if self.log_prior is not None:
-            without_prior = self.scores(query, scanned=scanned)
-            ratio = prior_ratio(without_prior.loglik, self.log_prior)
-        elsewhere = self._elsewhere([query], chances)
-        return self._location(
-            *(query, scores, chances),
-            top=top or self.top,
-            store=store,
-            ratio=ratio,
-            elsewhere=elsewhere,
-        )
+    def locate(self, query: Signature, *, top: int | None = None) -> Location:
+        """Locate a query."""
+        (location,) = self.locate_versions([[query]], top=top)
+        return location
 
     def locate_route(
-        self,
-        queries: Sequence[Signature],
-        legs: Sequence[Leg],
-        *,
-        scores: Sequence[CellScores] | None = None,
-        scanned: CellScores | None = None,
+        self, queries: Sequence[Signature], legs: Sequence[Leg]
     ) -> tuple[Location, ...]:
-        """Locate the views of a route; any of them may have no objects.
+        """Locate the views of a route; any of them may have no objects."""
+        return self.locate_versions([queries], legs)
 
-        Their `scores`, and the result `scanned` of `scan` for the first, are computed if not given.
+    def locate_versions(
+        self,
+        versions: Sequence[Sequence[Signature]],
+        legs: Sequence[Leg] = (),
+        *,
+        log_weights: Sequence[Sequence[float]] | None = None,
+        scores: Sequence[Sequence[CellScores]] | None = None,
+        scanned: Sequence[CellScores] | None = None,
+        top: int | None = None,
+    ) -> tuple[Location, ...]:
+        """Locate a view, or the views of a route, of which exactly one version is right.
+
+        Before they are compared, all versions have the same chance. `log_weights` are added to the
+        log-likelihood of each view, for densities that are not per degree. The `scores` of the
+        views, and the results `scanned` of `scan` for the first, are computed if not given.
         """
-        if scores is None:
-            first = [self.scores(query, self.log_prior) for query in queries[:1]]
-            scores = first + [self.scores(query) for query in queries[1:]]
-        logliks = [view.loglik for view in scores]
         database, log_prior = self.index.database, self.log_prior
-        chances = route_posteriors(database, logliks, legs, log_prior=log_prior)
-        store, ratio = self._store_for(queries), None
+        scored = [self._route_scores(queries) for queries in versions] if scores is None else scores
+        chances = [
+            route_posteriors(database, [view.loglik for view in views], legs, log_prior=log_prior)
+            for views in scored
+        ]
+        evidence = np.array([views[0].log_evidence for views in chances])
+        for number, weights in enumerate(log_weights or ()):
+            for query, weight in zip(versions[number], weights, strict=True):
+                evidence[number] += weight * photo_power(
+                    len(View.of(query).photos), self.index.noise
+                )
+        shares = np.exp(evidence - np.logaddexp.reduce(evidence))
+        best, ratio = int(shares.argmax()), None
         if log_prior is not None:
-            logliks[0] = self.scores(queries[0], scanned=scanned).loglik
-            start = route_posteriors(database, logliks, legs)[0].chances
-            ratio = prior_ratio(np.log(np.maximum(start, TINY)), log_prior)
-        elsewhere = self._elsewhere(queries, chances[0])
+            first = self.scores(versions[best][0], scanned=scanned and scanned[best]).loglik
+            if legs:
+                logliks = [first, *(view.loglik for view in scored[best][1:])]
+                start = route_posteriors(database, logliks, legs)[0].chances
+                first = np.log(np.maximum(start, TINY))
+            ratio = prior_ratio(first, log_prior)
+        elsewhere = 0.0
+        if not self.surely_here:
+            ratios = [
+                self.evidence_ratio(queries, views[0])
+                for queries, views in zip(versions, chances, strict=True)
+            ]
+            here, away = np.logaddexp.reduce(evidence), np.logaddexp.reduce(evidence - ratios)
+            elsewhere = float(area_chances([float(here - away)])[-1])
         return tuple(
-            self._location(*view, top=self.top, store=store, ratio=ratio, elsewhere=elsewhere)
-            for view in zip(queries, scores, chances, strict=True)
+            self._location(
+                [_Version(*parts) for parts in zip(*view, strict=True)],
+                shares=shares,
+                top=top or self.top,
+                store=self._store_for(versions[best]),
+                ratio=ratio,
+                elsewhere=elsewhere,
+            )
+            for view in zip(
+                zip(*versions, strict=True),
+                zip(*scored, strict=True),
+                zip(*chances, strict=True),
+                strict=True,
+            )
         )
+
+    def _route_scores(self, queries: Sequence[Signature]) -> list[CellScores]:
+        """Return the scores of the views of a route; the prior is that of the first."""
+        first = [self.scores(query, self.log_prior) for query in queries[:1]]
+        return first + [self.scores(query) for query in queries[1:]]
 
     def rankings(
         self,
@@ -435,12 +475,6 @@ class LikelihoodLocator:
         blind = any(query.bearings is None and len(query) for query in queries)
         return self.store if self.refined or (self.refined is None and not blind) else None
 
-    def _elsewhere(self, queries: Sequence[Signature], posterior: Posterior) -> float:
-        """Return the chance that some views, all from one area, are not from that of the cells."""
-        if self.surely_here:
-            return 0.0
-        return float(area_chances([self.evidence_ratio(queries, posterior)])[-1])
-
     def evidence_ratio(self, queries: Sequence[Signature], posterior: Posterior) -> float:
         """Return how much likelier some views are in this area than elsewhere, as a logarithm."""
         usable = list(map(self._usable_objects, queries))
@@ -448,21 +482,29 @@ class LikelihoodLocator:
 
     def _location(
         self,
-        query: Signature,
-        scores: CellScores,
-        posterior: Posterior,
+        versions: Sequence[_Version],
         *,
+        shares: NDArray[np.float64],
         top: int,
         store: ObjectStore | None,
         ratio: float | None,
         elsewhere: float,
     ) -> Location:
-        """Return the answer from the chances of the cells, refined if a store is given."""
-        parts = None
-        usable = self._usable_objects(query)
-        if store is not None and len(usable):
-            parts = self.parts(usable, scores, posterior, store)
-            scores, posterior = _with_parts(parts, scores, posterior)
+        """Return the answer from the chances of the cells, refined if a store is given.
+
+        It is explained by the likeliest version; `shares` are the chances of all.
+        """
+        parts, chances = None, np.zeros(len(self.index.database))
+        # The likeliest comes last, so that its scores and parts are used below.
+        for number in np.argsort(shares, kind="stable").tolist():
+            query, scores, posterior = versions[number]
+            usable = self._usable_objects(query)
+            if store is not None and len(usable) and shares[number] >= LEAST_REFINED:
+                parts = self.parts(usable, scores, posterior, store)
+                scores, posterior = _with_parts(parts, scores, posterior)
+            chances += shares[number] * posterior.chances
+        if len(versions) > 1:
+            posterior = replace(posterior, chances=chances / chances.sum())
         places = posterior.places(top, radius=self.rule.radius)
         answer = self.rule.decide(posterior, places=places)
         radius, sigma = self.rule.radius, self.north_sigma
@@ -509,6 +551,8 @@ class LikelihoodLocator:
             prior_ratio=ratio,
             north=self.north,
             place_name=self.place_name or (self.store and self.store.place_name),
+            headings=scores.headings,
+            versions=tuple(shares.tolist()),
         )
         return location.doubted(elsewhere, fit)
 
@@ -628,6 +672,53 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
     True
     """
     return LikelihoodLocator(index=index, **options).locate(query)
+
+
+def locate_versions(
+    index: LikelihoodIndex,
+    versions: Sequence[Signature],
+    *,
+    log_weights: Sequence[float] | None = None,
+    **options: Unpack[LocateOptions],
+) -> Location:
+    """Locate a query of which exactly one of several versions is right.
+
+    A photo of unknown field of view, for example, has a version for each field of view that it may
+    have. The chances of places are the sums over the versions.
+
+    Parameters
+    ----------
+    index : LikelihoodIndex
+        As of `locate`.
+    versions : sequence of Signature
+        The versions, with the same chance before they are compared.
+    log_weights : sequence of float, optional
+        Logarithm of a factor of the likelihood of each, 0 by default: bearings of versions may be
+        stretched, and their densities are per degree.
+    **options : LocateOptions
+        As of `locate`.
+
+    Returns
+    -------
+    Location
+        The answer, with the chance of each version in its `versions`.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, named_noise
+    >>> index = build_index(demo_database, named_noise("light"))
+    >>> longest = int(demo_database.lengths.argmax())
+    >>> seen = demo_database.signature(longest)
+    >>> versions = [demo_database.signature(0), seen]
+    >>> location = locate_versions(index, versions)
+    >>> len(location.versions), round(sum(location.versions), 9)
+    (2, 1.0)
+    """
+    locator = LikelihoodLocator(index=index, **options)
+    views = [[version] for version in versions]
+    weights = None if log_weights is None else [[weight] for weight in log_weights]
+    (location,) = locator.locate_versions(views, log_weights=weights)
+    return location
 
 
 def locate_in_areas(

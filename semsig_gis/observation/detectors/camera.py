@@ -20,6 +20,9 @@ Projection = Literal["pinhole", "equirectangular", "cylindrical", "fisheye"]
 USUAL_FOV: dict[str, float] = {"equirectangular": 360.0, "cylindrical": 360.0, "fisheye": 180.0}
 """Default fields of view in degrees; a pinhole camera has none."""
 
+POSSIBLE_FOV = (40.0, 55.0, 70.0, 85.0, 100.0)
+"""Fields of view in degrees that stand for those of a photograph whose own is unknown."""
+
 MOST_PIXELS = 1_000_000
 MOST_FOV = {"pinhole": 175.0}  # a flat picture cannot show half a turn
 
@@ -111,6 +114,18 @@ class Camera:
         if self.projection == "pinhole":
             return self.width / 2.0 / math.tan(math.radians(self.fov) / 2.0)
         return self.width / math.radians(self.fov)
+
+    def log_scale(self, bearings: ArrayLike) -> float:
+        """Return the sum of the logarithms of radians per pixel at some bearings from the axis.
+
+        It turns a density of bearings per degree into one of columns per pixel, up to a constant:
+        views of one photograph with different fields of view are compared by the latter.
+        """
+        angles = np.radians(np.asarray(bearings, dtype=np.float64))
+        logs = -math.log(self.focal) * angles.size
+        if self.projection == "pinhole":
+            logs += 2.0 * float(np.log(np.maximum(np.cos(angles), MIN_DEPTH)).sum())
+        return logs
 
     @property
     def _turn(self) -> NDArray[np.float64]:

@@ -27,6 +27,7 @@ from semsig_gis.localization import (
     cell_noise,
     locate,
     locate_route,
+    locate_versions,
     named_noise,
     position_prior,
     posterior,
@@ -503,3 +504,31 @@ def test_hundreds_of_objects_almost_without_misses_do_not_underflow(
     query = database.signature(0).select(np.arange(0, 200, 2))
     loglik = build_index(database, noise).scores(query, north_sigma=north_sigma).loglik
     assert np.isfinite(loglik).all()
+
+
+def test_versions_are_mixed_by_their_evidence() -> None:
+    first, second = CITY.signature(LONG[0]), CITY.signature(LONG[1])
+    each = [locate(WIDE, query) for query in (first, second)]
+    weights = [0.3, -0.2]
+    evidence = np.array([answer.posterior.log_evidence for answer in each]) + weights
+    shares = np.exp(evidence - np.logaddexp.reduce(evidence))
+    mixed = locate_versions(WIDE, [first, second], log_weights=weights, top=3)
+    assert mixed.versions == pytest.approx(shares.tolist())
+    expected = shares[0] * each[0].chances + shares[1] * each[1].chances
+    assert mixed.chances == pytest.approx(expected)
+    assert mixed.query is (first, second)[int(shares.argmax())]
+    assert mixed.answer.mass <= max(answer.answer.mass for answer in each)
+    # Equal versions are one version.
+    same, single = locate_versions(WIDE, [first, first]), locate(WIDE, first)
+    assert same.versions == pytest.approx((0.5, 0.5))
+    assert same.chances == pytest.approx(single.chances)
+    assert same.elsewhere == pytest.approx(single.elsewhere)
+    # A prior and refined places go with them.
+    prior = position_prior(CITY, tuple(CITY.xy[LONG[0]]), sigma=50.0)
+    options: dict[str, Any] = {"store": STORE, "refined": True, "log_prior": prior}
+    same = locate_versions(WIDE, [first, first], **options)
+    single = locate(WIDE, first, **options)
+    assert same.prior_ratio == pytest.approx(single.prior_ratio)
+    assert (same.estimate.x, same.estimate.y) == pytest.approx(
+        (single.estimate.x, single.estimate.y)
+    )
