@@ -251,4 +251,5 @@ def _table(rows: Sequence[Mapping[str, Any]]) -> Table:
             ]
             for row in rows
         ],
+        minor=("5 m", "10 m", "heading error", "Brier", "calibration error", "s per view"),
     )

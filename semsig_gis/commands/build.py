@@ -196,7 +196,9 @@ class Build:
         from semsig_gis.database import open_city
 
         size = open_city(self.out).bytes / 1e6
+        where = {"all": "", "outdoor": " outside buildings", "streets": " along streets"}
         yield (
-            f"{cells:,} cells of {self.step:g} m, from which {entries / cells:.1f} objects are "
-            f"seen on average, in {size:.1f} MB."
+            f"{cells:,} cells of {self.step:g} m{where[self.viewpoints]} see "
+            f"{entries / cells:.1f} street objects on average, up to {self.radius:g} m away, in "
+            f"{size:.1f} MB."
         )

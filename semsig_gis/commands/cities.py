@@ -31,6 +31,7 @@ def locate_in_cities(
     *,
     surely_here: bool,
     top: int,
+    symbols: bool,
     reporter: Reporter,
 ) -> Result:
     """Answer a query that may be from any of some cities, from its locator in each."""
@@ -60,5 +61,5 @@ def locate_in_cities(
     return Result(
         values=values,
         summary=cities_summary(locations, elsewhere),
-        tables=cities_tables(locations, elsewhere, top=top),
+        tables=cities_tables(locations, elsewhere, top=top, symbols=symbols),
     )

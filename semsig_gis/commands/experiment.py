@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from semsig_gis.commands.model import Option, Reporter, Result, command
 from semsig_gis.commands.options import Scheduler, Workers
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from semsig_gis.evaluation import Evaluation
 
 
 @command(
@@ -53,7 +58,13 @@ class Experiment:
 
         return Result(
             values=lambda: {name: item.summary() for name, item in results.items()},
-            summary=[f"{len(results):,} evaluations."],
+            summary=self._summary(results),
             tables=experiment_tables(spec, results),
             files={"results": self.out},
         )
+
+    def _summary(self, results: Mapping[str, Evaluation]) -> Iterator[str]:
+        from semsig_gis.output import evaluation_headline
+
+        name, best = max(results.items(), key=lambda pair: pair[1].means()["value"]["p50"])
+        yield f"The best of {len(results):,} evaluations is {name}. {evaluation_headline(best)}"

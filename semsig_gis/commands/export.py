@@ -102,7 +102,11 @@ class Export:
                     f"{self.out} describes the files of a database; give only --objects with it."
                 )
             export_item(self.database, self.out, objects=self.objects)
-            return Result(values=lambda: values, summary=["A description."], files=files)
+            return Result(
+                values=lambda: values,
+                summary=["A description of the database (STAC item)."],
+                files=files,
+            )
         city = open_city(self.database)
         queries = None if self.evaluation is None else open_evaluation(self.evaluation)
         # Hexagons count the objects that the database was built from, if they are stored with it.
@@ -122,5 +126,7 @@ class Export:
             )
         cells = len(city.database)
         return Result(
-            values=lambda: {**values, "cells": cells}, summary=[f"{cells:,} cells."], files=files
+            values=lambda: {**values, "cells": cells},
+            summary=[f"{cells:,} cells, for other programs."],
+            files=files,
         )

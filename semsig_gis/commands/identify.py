@@ -19,7 +19,7 @@ from semsig_gis.commands.options import (
     known_identifiability,
     read_noise,
 )
-from semsig_gis.core import InputError, Table
+from semsig_gis.core import InputError, Table, percent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -159,7 +159,7 @@ class Identify:
         report = {} if self.out is None else {"report": self.out / "report.html"}
         return Result(
             values=values,
-            summary=[],
+            summary=self._summary(columns, check),
             tables=self._tables(columns, check, counts),
             files={"columns": self.database, **report},
         )
@@ -171,6 +171,18 @@ class Identify:
             return None
         stored = columns.noise, columns.radius, columns.view, columns.seed
         return columns if stored == (noise, self.radius, self.view, self.seed) else None
+
+    def _summary(
+        self, columns: Identifiability, check: IdentifiabilityCheck | None
+    ) -> Iterator[str]:
+        from semsig_gis.output import identifiability_sentence
+
+        fresh = (
+            ""
+            if check is None
+            else f"; of {check.queries:,} fresh ones, {percent(check.found, 0)} were"
+        )
+        yield f"{identifiability_sentence(columns)}{fresh}."
 
     def _tables(
         self,

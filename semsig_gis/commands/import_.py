@@ -68,4 +68,6 @@ class Import:
         save_database(contents.database, self.out)
         if contents.identifiability is not None:
             save_identifiability(contents.identifiability, self.out)
-        return Result(values=lambda: values, summary=[f"{cells:,} cells."], files=files)
+        return Result(
+            values=lambda: values, summary=[f"A database of {cells:,} cells."], files=files
+        )

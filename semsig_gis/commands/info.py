@@ -81,7 +81,7 @@ class Properties(TypedDict):
     groups: Groups
     largest_type_group: TypeGroup
     identifiability: NotRequired[dict[str, Any]]
-    beside: list[databases.Companion]
+    files: list[databases.Companion]
 
 
 @command("info", title="Properties of a database", group="Databases", order=4, returns=Properties)
@@ -104,9 +104,21 @@ class Info:
             if columns is not None:
                 summary["identifiability"] = columns.summary(object_counts=counts)
             files = [file.to_dict() for file in companions(self.database)]
-            return summary | {"beside": files}
+            return summary | {"files": files}
 
-        return Result(values=values, summary=[], tables=self._tables(city, columns))
+        return Result(
+            values=values, summary=self._summary(city, columns), tables=self._tables(city, columns)
+        )
+
+    def _summary(self, city: City, columns: Identifiability | None) -> Iterator[str]:
+        from semsig_gis.database import database_summary
+        from semsig_gis.output import database_sentences, identifiability_sentence
+
+        yield from database_sentences(database_summary(city.database))
+        if columns is not None:
+            yield f"{identifiability_sentence(columns)}."
+        holders = dict.fromkeys(line.partition(": ")[0] for line in city.licenses)
+        yield f"Data: {', '.join(holders) or 'no licence stated'}."
 
     def _tables(self, city: City, columns: Identifiability | None) -> Iterator[str | Table]:
         from semsig_gis.database import companions

@@ -165,7 +165,11 @@ class Learn:
             )
         noise = replace(noise, name=self.out.stem)
         save_noise(noise, self.out)
-        return Result(values=noise.to_dict, summary=[], files={"noise model": self.out})
+        return Result(
+            values=noise.to_dict,
+            summary=[f"Learnt from {len(signatures):,} views of unknown places."],
+            files={"noise model": self.out},
+        )
 
     def _correction(self, learnt: NoiseSpec, fresh: NoiseSpec) -> str:
         """Return a sentence on what the age of the map explains."""

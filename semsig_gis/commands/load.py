@@ -168,11 +168,16 @@ class LoadOptions:
         )
         return Result(
             values=report.to_dict,
-            summary=[f"{len(loaded.objects):,} street objects of {len(report.classes)} classes."],
+            summary=self._summary(report),
             tables=self._tables(report),
             files=files,
             notes=notes,
         )
+
+    def _summary(self, report: street_objects.QualityReport) -> Iterator[str]:
+        from semsig_gis.output import quality_sentence
+
+        yield quality_sentence(report)
 
     def _tables(self, report: street_objects.QualityReport) -> Iterator[Table]:
         from semsig_gis.output import quality_tables

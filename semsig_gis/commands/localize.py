@@ -17,6 +17,7 @@ from semsig_gis.commands.options import (
     Paper,
     QueryOptions,
     SearchOptions,
+    Symbols,
     Top,
     adapted_noise,
     chosen_method,
@@ -82,6 +83,7 @@ class Localize(SearchOptions, QueryOptions):
     paper: Paper = False
     top: Top = 10
     explain: Explain = False
+    symbols: Symbols = False
     map: Annotated[
         Path | None, Option("Map to write (.html).", title="Map page", writes=".html")
     ] = None
@@ -140,6 +142,7 @@ class Localize(SearchOptions, QueryOptions):
                 },
                 surely_here=self.surely_here,
                 top=self.top,
+                symbols=self.symbols,
                 reporter=reporter,
             )
         from semsig_gis.database import open_city
@@ -405,4 +408,4 @@ class Localize(SearchOptions, QueryOptions):
     def _tables(self, answer: Any) -> Iterator[str | Table]:  # noqa: ANN401 - an answer of any method
         from semsig_gis.output import answer_tables
 
-        yield from answer_tables(answer)
+        yield from answer_tables(answer, symbols=self.symbols)

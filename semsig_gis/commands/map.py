@@ -143,10 +143,22 @@ class Map:
             offline = save_map(page, self.out, title=self.title or city_name(self.database))
         return Result(
             values=lambda: {"map": str(self.out)},
-            summary=[],
+            summary=[f"The map shows {', '.join(self._layers())}."],
             files={"map": self.out},
             notes=online_notes(offline, tiles=self.tiles),
         )
+
+    def _layers(self) -> list[str]:
+        """Return what the map shows, in words."""
+        layers = {
+            "how many cells look the same": self.ambiguity,
+            "how well cells can be found": self.identifiability,
+            "the views of an evaluation": self.evaluation,
+            "what has changed": self.drift,
+            "where a view may be from": self.location,
+            "street objects": self.objects,
+        }
+        return [words for words, given in layers.items() if given]
 
     def _objects(self, city: City) -> dict[str, Any]:
         """Return the street objects, which lie where the database does."""

@@ -99,6 +99,14 @@ Explain = Annotated[
         title="Explain the best places",
     ),
 ]
+Symbols = Annotated[
+    bool,
+    Option(
+        "Print classes in tables as letters, such as DDBL, instead of words.",
+        title="Classes as letters",
+        advanced=True,
+    ),
+]
 NorthText = Literal["grid", "true", "magnetic"]
 NorthName = Annotated[
     NorthText,

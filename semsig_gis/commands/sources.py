@@ -93,12 +93,17 @@ class Sources:
 
         if self.name is not None:
             catalog = load_catalog(self.name)
-            return Result(values=partial(asdict, catalog), summary=_details(catalog))
+            return Result(
+                values=partial(asdict, catalog),
+                summary=_about(catalog),
+                tables=_details(catalog),
+            )
         listed = [load_catalog(name) for name in catalogs()]
         readers = list(READERS)
         return Result(
             values=lambda: {"catalogs": [*map(_row, listed)], "readers": readers},
-            summary=_list(listed, readers),
+            summary=_list(listed),
+            tables=_more(listed, readers),
         )
 
 
@@ -116,26 +121,31 @@ def _row(catalog: Catalog) -> CatalogRow:
     }
 
 
-def _list(listed: list[Catalog], readers: list[str]) -> Iterator[str | Table]:
+def _list(listed: list[Catalog]) -> Iterator[str | Table]:
     yield Table.of(
-        "Catalogues",
-        ("name", "place", "needs", "classes", "layers", "reader", "licence"),
-        (
-            [
-                c.name,
-                c.place,
-                _needs_text(c),
-                "".join(item.symbol for item in c.classes),
-                len(c.layers),
-                c.reader,
-                c.license,
-            ]
-            for c in listed
-        ),
+        f"{len(listed)} catalogues; semsig sources NAME has the layers and classes of one",
+        ("name", "place", "needs"),
+        ([c.name, c.place, _needs_text(c)] for c in listed),
     )
-    symbols = {item.symbol: item.name for c in listed for item in c.classes}
-    yield f"classes: {', '.join(f'{symbol} {name}' for symbol, name in symbols.items())}"
-    yield f"readers: {', '.join(readers)}"
+
+
+def _more(listed: list[Catalog], readers: list[str]) -> Iterator[str | Table]:
+    yield Table.of(
+        "Contents",
+        ("name", "classes", "layers", "reader", "licence"),
+        ([c.name, len(c.classes), len(c.layers), c.reader, c.license] for c in listed),
+    )
+    yield f"Readers for own catalogues: {', '.join(readers)}."
+
+
+def _about(catalog: Catalog) -> Iterator[str]:
+    """Yield what a catalogue holds and needs, its classes and its licence."""
+    yield (
+        f"{catalog.title}: {len(catalog.layers)} layers; place: "
+        f"{catalog.place or 'not stated'}; needs {_needs_text(catalog)}."
+    )
+    yield f"Classes: {', '.join(item.title.lower() for item in catalog.classes)}."
+    yield f"Licence: {catalog.license}."
 
 
 def _details(catalog: Catalog) -> Iterator[str | Table]:
@@ -157,9 +167,8 @@ def _details(catalog: Catalog) -> Iterator[str | Table]:
             for spec in catalog.layers
         ),
     )
-    yield f"place: {catalog.place or 'not stated'}; needs {_needs_text(catalog)}"
     if common:
-        yield f"left out of every layer of objects: {', '.join(_rules(common))}"
+        yield f"Left out of every layer of objects: {', '.join(_rules(common))}."
     yield Table.of(
         "Classes",
         ("symbol", "code", "class", "title"),

@@ -27,7 +27,7 @@ class Suggest(SearchOptions, QueryOptions):
         """Return the questions and the present answer."""
         from semsig_gis.database import open_city
         from semsig_gis.localization import next_questions, with_unplaced
-        from semsig_gis.output import suggest_summary
+        from semsig_gis.output import suggest_summary, suggest_tables
 
         city = open_city(self.database)
         north = query_north(city, self.north, self.date)
@@ -55,4 +55,8 @@ class Suggest(SearchOptions, QueryOptions):
                 "questions": [question.to_dict() for question in questions],
             }
 
-        return Result(values=values, summary=suggest_summary(questions, location))
+        return Result(
+            values=values,
+            summary=suggest_summary(questions, location),
+            tables=suggest_tables(questions),
+        )

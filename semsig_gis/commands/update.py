@@ -78,7 +78,7 @@ class Update:
         """Write the new database; return the changes."""
         from semsig_gis.database import open_city, update_file, update_tiles
         from semsig_gis.objects import open_objects
-        from semsig_gis.output import update_tables
+        from semsig_gis.output import update_sentence, update_tables
 
         had_columns = open_city(self.database).has_columns
         tiled = self.database.is_dir()
@@ -112,7 +112,7 @@ class Update:
 
         return Result(
             values=values,
-            summary=[],
+            summary=[update_sentence(report)],
             tables=update_tables(report),
             files={"signature database": self.out or self.database},
         )

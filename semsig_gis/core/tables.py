@@ -61,7 +61,14 @@ class Table:
     minor: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, title: str, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> Table:
+    def of(
+        cls,
+        title: str,
+        columns: Iterable[str],
+        rows: Iterable[Iterable[object]],
+        *,
+        minor: tuple[str, ...] = (),
+    ) -> Table:
         """Return a table of values; whole numbers get thousands separators, identifiers do not."""
         texts = (
             tuple(
@@ -70,7 +77,7 @@ class Table:
             )
             for row in rows
         )
-        return cls(title, tuple(columns), tuple(texts))
+        return cls(title, tuple(columns), tuple(texts), minor=minor)
 
     @classmethod
     def of_columns(cls, title: str, columns: Mapping[str, Iterable[str]], note: str = "") -> Table:

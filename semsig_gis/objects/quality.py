@@ -44,6 +44,7 @@ class ClassQuality:
     """
 
     class_name: str
+    title: str
     objects: int
     rows: int
     per_km2_hull: float | None
@@ -179,6 +180,7 @@ def _class_quality(
     number = int(members.sum())
     return ClassQuality(
         class_name=item.name,
+        title=item.title,
         objects=number,
         rows=int(whole_numbers(objects.arrow[COUNT])[members].sum()),
         per_km2_hull=number / hull_km2 if hull_km2 > 0 else None,

@@ -142,10 +142,12 @@ from .tables.answer import city_candidates as city_candidates
 from .tables.answer import likeliest_city as likeliest_city
 from .tables.answer import route_summary as route_summary
 from .tables.answer import suggest_summary as suggest_summary
+from .tables.answer import suggest_tables as suggest_tables
 from .tables.answer_records import LocalizeRecord as LocalizeRecord
 from .tables.answer_records import RouteRecord as RouteRecord
 from .tables.answer_records import SuggestRecord as SuggestRecord
 from .tables.database import companion_table as companion_table
+from .tables.database import database_sentences as database_sentences
 from .tables.database import database_tables as database_tables
 from .tables.evaluation import comparison_sentence as comparison_sentence
 from .tables.evaluation import comparison_table as comparison_table
@@ -154,8 +156,11 @@ from .tables.evaluation import evaluation_tables as evaluation_tables
 from .tables.evaluation import paris_points as paris_points
 from .tables.identifiability import check_tables as check_tables
 from .tables.identifiability import identifiability_page as identifiability_page
+from .tables.identifiability import identifiability_sentence as identifiability_sentence
 from .tables.identifiability import identifiability_tables as identifiability_tables
+from .tables.quality import quality_sentence as quality_sentence
 from .tables.quality import quality_tables as quality_tables
+from .tables.quality import update_sentence as update_sentence
 from .tables.quality import update_tables as update_tables
 from .tables.tables import WIDEST as WIDEST
 from .tables.tables import brief_notes as brief_notes

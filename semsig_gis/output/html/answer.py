@@ -71,6 +71,7 @@ from semsig_gis.output.tables.answer import (
     north_sentences,
     note_sentences,
     place_sentences,
+    position_sentences,
     query_sentences,
     tie_sentences,
 )
@@ -335,7 +336,7 @@ def location_legend(location: Location) -> str:
         location,
         "Where it was seen",
         f"<p>{mark_svg(mark)} <b>{name}</b>, ellipse: 90 %<br>{method_text(method)}</p>",
-        tuple(place_sentences(location)),
+        (*place_sentences(location), *position_sentences(location)),
         f"{_chances_legend(posterior)}"
         f"{layer_part('Candidates', f'<p>{swatch(CANDIDATE)}Candidates by rank</p>')}"
         f"{layer_part('Objects from rank ', rays) if location.explanations else ''}",

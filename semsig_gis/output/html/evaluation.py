@@ -43,6 +43,7 @@ from semsig_gis.output.html.page_elements import (
     to_latlon,
 )
 from semsig_gis.output.layers.styles import FAILED
+from semsig_gis.output.tables.tables import method_words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -321,7 +322,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     return (
         "<summary>Localization errors</summary>"
         f"<p><b>{share}</b> of {count:,} queries "
-        f"{within}<br>{method_text(f'{escape(str(evaluation.method))}, {best}')}<br>"
+        f"{within}<br>{method_text(f'{escape(method_words(evaluation.method))}, {best}')}<br>"
         f"Distortion: {escaped_text(distortions or 'none')}</p>"
         f"{layer_part('Successful queries', successful)}"
         f"{layer_part('Failed queries', failed)}"

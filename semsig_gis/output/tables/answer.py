@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import WILDCARD, Table, figure, percent
+from semsig_gis.core import Table, figure, percent, to_degrees
 from semsig_gis.localization import Location
 from semsig_gis.observation import GRID_NORTH, View
 
@@ -14,38 +15,52 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Taxonomy
     from semsig_gis.localization import Answer, ClassQuestion, Explanation, Localization
-    from semsig_gis.observation import North
 
+LINKS = 2  # addresses below an answer; the details have all
+QUESTIONS = 5  # best ones of those to ask next; the details have all
 EXPLANATION = (
     *("verdict", "chance", "seen", "at", "object", "at", "off by", "distance", "source", "id"),
 )
 
 
 def answer_summary(answer: Location | Localization) -> Iterator[Table | str]:
-    """Yield what a person reads of an answer: the place, and how the query was understood.
+    """Yield what a person reads of an answer: the place, links, and what was understood.
 
     If there are explanations, they are between the two.
     """
     if isinstance(answer, Location):
         yield from place_sentences(answer)
-        for rank, explanation in enumerate(answer.explanations, 1):
-            yield _explanation_table(rank, explanation, answer.north)
-        yield from _known_sentences(answer.known)
     else:
+        (lon, lat), place = to_degrees(answer.crs).transform(*answer.xy), _place(answer)
+        yield f"Most similar: {lat:.6f}, {lon:.6f} (lat, lon){place}, by {answer.used}."
         yield from tie_sentences(answer)
+    for title, address in itertools.islice(answer.links.items(), LINKS):
+        yield f"{title}: {address}"
+    if isinstance(answer, Location):
+        for rank, explanation in enumerate(answer.explanations, 1):
+            yield _explanation_table(rank, explanation, answer)
+        yield from _known_sentences(answer.known)
     yield from (*query_sentences(answer), *north_sentences(answer), *note_sentences(answer))
 
 
-def answer_tables(answer: Location | Localization) -> Iterator[Table]:
-    """Yield the table of the candidates of an answer."""
+def answer_tables(
+    answer: Location | Localization, *, symbols: bool = False
+) -> Iterator[Table | str]:
+    """Yield the details of an answer: the position in metres, the candidates and all links.
+
+    With `symbols`, the classes of the candidates are letters instead of words.
+    """
     cells = f"{answer.cells:,} cells"
     number = len(answer.columns["cell"])
     if isinstance(answer, Location):
+        yield from position_sentences(answer)
         title = f"{number} best places in {cells} (noise: {answer.noise})"
-        yield _candidate_table(answer, title, "chance", percent)
+        yield _candidate_table(answer, title, "chance", percent, symbols=symbols)
     else:
         title = f"{number} best of {cells}, by {answer.used}"
-        yield _candidate_table(answer, title, "distance", figure)
+        yield _candidate_table(answer, title, "distance", figure, symbols=symbols)
+    for title, address in itertools.islice(answer.links.items(), LINKS, None):
+        yield f"{title}: {address}"
 
 
 def cities_summary(locations: Mapping[str, Location], elsewhere: float) -> Iterator[str]:
@@ -63,7 +78,7 @@ def cities_summary(locations: Mapping[str, Location], elsewhere: float) -> Itera
 
 
 def cities_tables(
-    locations: Mapping[str, Location], elsewhere: float, *, top: int
+    locations: Mapping[str, Location], elsewhere: float, *, top: int, symbols: bool = False
 ) -> Iterator[Table]:
     """Yield the table of the best candidates of some cities."""
     _, best = likeliest_city(locations)
@@ -72,14 +87,15 @@ def cities_tables(
     places = (
         (
             *(f"{row['rank']:,}", row["city"], str(row["cell_id"])),
-            *(f"{row['lat']:.6f}", f"{row['lon']:.6f}", percent(row["chance"]), row["types"]),
+            *(f"{row['lat']:.6f}", f"{row['lon']:.6f}", percent(row["chance"])),
+            _classes_text(row["types"], locations[row["city"]].taxonomy, symbols=symbols),
         )
         for row in rows
     )
     yield Table(
         f"{len(rows)} best places in {cells:,} cells of {len(locations)} cities "
         f"(noise: {best.noise})",
-        ("rank", "city", "cell", "lat", "lon", "chance", "types"),
+        ("rank", "city", "cell", "lat", "lon", "chance", SEEN_THERE),
         (*places, ("", "elsewhere", "", "", "", percent(elsewhere), "")),
         minor=MINOR,
     )
@@ -112,60 +128,82 @@ def route_summary(
             f"{location.estimate.sigma:.1f}",
             percent(location.answer.mass),
             "yes" if location.answer.given else "cannot tell",
+            location.place,
         )
         for name, location in zip(names, locations, strict=True)
     )
-    heads = ("view", *POSITION, "± m, if there", "chance", "answered")
+    heads = ("view", *POSITION, "± m, if there", "chance", "answered", "place")
     table = Table(f"{len(locations)} views of {city}", heads, tuple(rows), minor=MINOR)
     return [table, *place_sentences(locations[-1]), *note_sentences(*locations)]
 
 
-def suggest_summary(questions: Iterable[ClassQuestion], location: Location) -> list[Table | str]:
-    """Return what to look for next, with the place, the query and the notes of the answer."""
+def suggest_summary(questions: Sequence[ClassQuestion], location: Location) -> Iterator[str]:
+    """Yield the best questions to ask next, with the place, the query and notes of the answer."""
+    yield from place_sentences(location)
+    for number, question in enumerate(questions[:QUESTIONS], start=1):
+        yield f"{number}. {question.text} (yes: chance {percent(question.chance)})"
+    yield from (*query_sentences(location), *note_sentences(location))
+
+
+def suggest_tables(questions: Iterable[ClassQuestion]) -> Iterator[Table]:
+    """Yield a table of all questions, most useful first."""
     rows = (
-        (row.text, row.item.symbol, percent(row.chance), f"{round(row.gain, 4):.3f}")
-        for row in questions
+        (question.text, percent(question.chance), f"{round(question.gain, 4):.3f}")
+        for question in questions
     )
-    table = Table("What to look for next", ("question", "symbol", "yes", "bits"), tuple(rows))
-    sentences = *place_sentences(location), *query_sentences(location), *note_sentences(location)
-    return [table, *sentences]
+    yield Table("What to look for next", ("question", "yes", "bits"), tuple(rows))
 
 
 def place_sentences(location: Location) -> list[str]:
     """Return the place of an answer by likelihood, and whether it is certain enough.
 
-    Without an answer, the region comes first, and the position only with "if it is there".
+    Without an answer, the region comes first.
+    """
+    sure, (lon, lat) = location.answer.given, location.degrees
+    place = (
+        f"{'' if sure else 'Best place: '}{lat:.6f}, {lon:.6f} (lat, lon){_place(location)}: "
+        f"within {location.rule.radius:g} m with a chance of {percent(location.answer.mass)}."
+    )
+    doubt = [location.doubt] if location.doubt else []
+    region = [] if sure else [f"Cannot tell. {location.region_text}."]
+    return [*region, *doubt, place]
+
+
+def _place(answer: Answer) -> str:
+    return f", {answer.place}" if answer.place else ""
+
+
+def position_sentences(location: Location) -> list[str]:
+    """Return the position in metres and the heading of an answer by likelihood, and its region.
+
+    Without an answer, they begin with "if it is there", and the region is elsewhere.
     """
     estimate, sure = location.estimate, location.answer.given
-    x, y, lat, lon = _position(estimate.x, estimate.y, *location.degrees)
-    best, there = ("", "") if sure else ("Best place: ", "If it is there: ")
-    chance = f"within {location.rule.radius:g} m of it: chance {percent(location.answer.mass)}"
+    x, y, *_ = _position(estimate.x, estimate.y, *location.degrees)
+    there = "" if sure else "If it is there: "
     longer, shorter, bearing = estimate.ellipse()
-    place = [
-        f"{best}{lat}, {lon} (lat, lon), {chance}.",
+    sentences = [
         (
             f"{there or 'Position: '}x {x}, y {y} ± {estimate.sigma:.1f} m "
             f"(90 %: {longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across)."
-        ),
+        )
     ]
     if estimate.heading is not None:
         north = "north of the query" if there else "North of the query:"
-        place.append(
+        sentences.append(
             f"{there}{north} {estimate.heading % 360.0:.1f}° ± {estimate.heading_sigma:.1f}° "
             f"from {location.north.name} north."
         )
-    doubt = [location.doubt] if location.doubt else []
-    region = f"{location.region_text}."
-    return [*doubt, *place, region] if sure else [f"Cannot tell. {region}", *doubt, *place]
+    return [*sentences, f"{location.region_text}."] if sure else sentences
 
 
 def query_sentences(answer: Answer) -> Iterator[str]:
-    """Yield the query, photo by photo, as it was understood."""
+    """Yield the query, photo by photo, as it was understood, and what is not there."""
     view = View.of(answer.query)
     for number, photo in enumerate(view.photos):
         rows = [row for row, owner in enumerate(view.photo_rows.tolist()) if owner == number]
         objects = ", ".join(_object_text(view, row, answer.taxonomy) for row in rows) or "nothing"
-        sectors = ", ".join(f"{start:.4g}-{end % 360.0:.4g}°" for start, end in photo.sectors)
+        sectors = ", ".join(f"{start:.4g} to {end % 360.0:.4g}°" for start, end in photo.sectors)
         looked = f"; looked at {sectors}" if sectors else ""
         north = "" if photo.north_sigma is None else f"; north ± {photo.north_sigma:g}°"
         if photo.north_sigma == math.inf:
@@ -175,7 +213,7 @@ def query_sentences(answer: Answer) -> Iterator[str]:
     knowledge = answer.known if isinstance(answer, Location) else {}
     for name, label in (("seen", "Seen somewhere"), ("absent", "Not there")):
         if titles := knowledge.get(name):
-            yield f"{label}: {', '.join(titles)}."
+            yield f"{label}: {', '.join(titles).lower()}."
 
 
 def tie_sentences(answer: Localization) -> Iterator[str]:
@@ -199,7 +237,7 @@ def note_sentences(*answers: Answer) -> Iterator[str]:
 
 
 def _candidate_table(
-    answer: Answer, title: str, score: str, score_text: Callable[[float], str]
+    answer: Answer, title: str, score: str, score_text: Callable[[float], str], *, symbols: bool
 ) -> Table:
     """Return the table of candidates, with a column of scores."""
     rows = []
@@ -207,11 +245,17 @@ def _candidate_table(
         low, high = (row.get(name, row.get("rank")) for name in ("rank_low", "rank_high"))
         rank = f"{low:,}" if low == high else f"{low}-{high}"
         position = _position(row["x"], row["y"], row["lon"], row["lat"])
-        rows.append((rank, str(row["cell_id"]), *position, score_text(row[score]), row["types"]))
-    heads = ("rank", "cell", *POSITION, score, "types")
+        seen = _classes_text(row["types"], answer.taxonomy, symbols=symbols)
+        rows.append((rank, str(row["cell_id"]), *position, score_text(row[score]), seen))
+    heads = ("rank", "cell", *POSITION, score, SEEN_THERE)
     return Table(title, heads, tuple(rows), minor=MINOR)
 
 
+def _classes_text(types: str, taxonomy: Taxonomy, *, symbols: bool) -> str:
+    return types if symbols else taxonomy.words(taxonomy.encode(types))
+
+
+SEEN_THERE = "seen from there"
 POSITION = ("x", "y", "lat", "lon")
 MINOR = ("cell", "x", "y")  # a place for people is in degrees
 
@@ -236,39 +280,39 @@ def _known_sentences(knowledge: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
-    """Return an object of a query: ``D 80°, 7.3 m ± 56 %``."""
+    """Return an object of a query: ``street light at 80°, 7.3 m away``."""
     parts = []
     if view.scores is not None:
-        names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: "unknown"}
         scores = enumerate(view.scores[row].tolist())
-        parts.append(" or ".join(f"{names[code]} {score:.2g}" for code, score in scores if score))
-    elif view.codes is not None:
-        parts.append(taxonomy.decode(view.codes[row : row + 1]))
+        parts.append(
+            " or ".join(f"{taxonomy.words([code])} {score:.2g}" for code, score in scores if score)
+        )
+    else:
+        parts.append("something" if view.codes is None else taxonomy.words([view.codes[row]]))
     if view.bearings is not None:
-        parts.append(f"{view.bearings[row]:.4g}°")
+        parts.append(f"at {view.bearings[row]:.4g}°")
     if view.ranges is not None and not math.isnan(view.ranges[row]):
-        error = math.nan if view.range_errors is None else view.range_errors[row]
-        spread = "" if math.isnan(error) else f" ± {percent(error, 0)}"
-        parts.append(f"{view.ranges[row]:.3g} m{spread}")
+        parts.append(f"{view.ranges[row]:.2g} m away")
     return " ".join(parts)
 
 
-def _explanation_table(rank: int, explanation: Explanation, north: North) -> Table | str:
+def _explanation_table(rank: int, explanation: Explanation, answer: Location) -> Table | str:
     """Return the counts of a candidate; for the best one, a table of its objects."""
     rows, counts = explanation.rows, explanation.counts
     outside = len(rows) - sum(counts.values())
     texts = [f"{count} {verdict}" for verdict, count in counts.items()]
     summary = ", ".join(texts) + (f"; {outside} outside the photos" if outside else "")
-    x, y = explanation.xy
-    title = f"Rank {rank}, at x {x:.1f}, y {y:.1f}: {summary}"
+    lon, lat = to_degrees(answer.crs).transform(*explanation.xy)
+    title = f"Place {rank}, {lat:.6f}, {lon:.6f} (lat, lon): {summary}."
     if rank > 1:
         return title
+    names = {item.name: item.title.lower() for item in answer.taxonomy.classes}
 
     def measure(value: float | None, spec: str, unit: str, before: str = "") -> str:
         return "" if value is None else f"{before}{value:{spec}}{unit}"
 
     def bearing_text(bearing: float | None) -> str:
-        return measure(None if bearing is None else north.from_grid(bearing), ".1f", "°")
+        return measure(None if bearing is None else answer.north.from_grid(bearing), ".1f", "°")
 
     shown = sorted(
         (row for row in rows if row["verdict"] in counts),
@@ -281,9 +325,9 @@ def _explanation_table(rank: int, explanation: Explanation, north: North) -> Tab
             (
                 row["verdict"],
                 f"{row['chance']:.2f}",
-                row["query_class"] or "",
+                names.get(row["query_class"], row["query_class"] or ""),
                 bearing_text(row["query_bearing"]) + measure(row["query_range"], ".1f", " m", ", "),
-                row["object_class"] or "",
+                names.get(row["object_class"], ""),
                 bearing_text(row["object_bearing"]),
                 measure(row["bearing_error"], "+.1f", "°"),
                 measure(row["distance"], ".1f", " m"),
@@ -292,4 +336,5 @@ def _explanation_table(rank: int, explanation: Explanation, north: North) -> Tab
             )
             for row in shown
         ),
+        minor=("source", "id"),
     )

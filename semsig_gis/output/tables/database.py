@@ -10,12 +10,12 @@ from semsig_gis.evaluation import published as paris
 from semsig_gis.output.tables.tables import distortion_rows, note_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from semsig_gis.database import Companion, SignatureDatabase
 
 MOST_TYPES = 20  # symbols that fit into a table
-GROUP_LABELS = {"alone": "cells alone in their group", "entropy_bits": "entropy, in bits"}
+GROUP_LABELS = {"alone": "cells in a group of one", "entropy_bits": "entropy, in bits"}
 
 
 def database_tables(
@@ -28,6 +28,18 @@ def database_tables(
     facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
     tables = (_occurrence_table, _property_table, _group_table, _class_table)
     return (*(table(facts) for table in tables), *note_tables(facts["notes"]))
+
+
+def database_sentences(facts: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the size of a database, how distinct its cells are, and the classes that are seen."""
+    yield (
+        f"{facts['signatures']:,} cells of {facts['step_m']:g} m see {facts['mean_length']:.1f} "
+        f"street objects on average, up to {facts['radius_m']:g} m away; "
+        f"{percent(facts['groups']['type']['alone'], 0)} of them see classes in an order that no "
+        "other cell sees."
+    )
+    seen = sorted(facts["occurrences"], key=lambda item: -item["number"])
+    yield f"Seen: {', '.join(item['title'].lower() for item in seen if item['number'])}."
 
 
 def companion_table(title: str, companions: Iterable[Companion]) -> Table:

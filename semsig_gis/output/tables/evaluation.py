@@ -12,7 +12,7 @@ from semsig_gis.core import ERROR_BREAKS, Table, figure, interval
 from semsig_gis.evaluation import DISTORTIONS, Evaluation, FalseClass, chain_text, percentile
 from semsig_gis.evaluation import published as paris
 from semsig_gis.localization import DEFAULT_RULE, NEAR_METRES, NEAR_PLACES
-from semsig_gis.output.tables.tables import short_percent
+from semsig_gis.output.tables.tables import method_words, short_percent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +43,7 @@ def evaluation_headline(evaluation: Evaluation) -> str:
     near = f"within {evaluation.success_metres} m"
     best = "" if evaluation.top == 1 else f" by the best of {evaluation.top:,} candidates"
     sentence = (
-        f"{short_percent(p50)} of {len(evaluation.queries):,} queries were placed {near}{best} "
+        f"Of {len(evaluation.queries):,} views, {short_percent(p50)} were placed {near}{best} "
         f"(95 %: {short_percent(low, unit='')} to {short_percent(high)})"
     )
     if "coverage" not in means.index:
@@ -52,8 +52,8 @@ def evaluation_headline(evaluation: Evaluation) -> str:
     if not answered:
         return f"{sentence}; the method was not sure enough to answer any of them."
     return (
-        f"{sentence}; the method was sure enough to answer {short_percent(answered)}, and "
-        f"{short_percent(right)} of these answers were right."
+        f"{sentence}; the method answers {short_percent(answered)} of them, and when it answers, "
+        f"it is right in {short_percent(right)}."
     )
 
 
@@ -76,7 +76,7 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
     >>> from semsig_gis import evaluate
     >>> evaluation = evaluate(demo_database, queries=5)
     >>> evaluation_tables(evaluation)[0].rows[0]
-    ('Method', 'likelihood:generic:on_grid')
+    ('Method', 'likelihood, noise: generic, from the centres of cells')
     """
     tables = (
         Table("Settings", ("Setting", "Value"), tuple(evaluation_settings(evaluation).items())),
@@ -118,7 +118,7 @@ def evaluation_settings(evaluation: Evaluation) -> dict[str, str]:
     megabytes = database["mb_per_km2"]
     city = "" if evaluation.city is None else f" of {evaluation.city}"
     return {
-        "Method": str(evaluation.method),
+        "Method": method_words(evaluation.method),
         "Best candidates that count (t)": f"{evaluation.top:,}",
         "Distortions": chain_text(spec.distortions) or "none",
         "Queries": f"{len(evaluation.queries):,}",

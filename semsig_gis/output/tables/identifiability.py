@@ -30,6 +30,15 @@ def query_name(view: float) -> str:
     return "query" if view == FULL_TURN else f"photo of {view:g} degrees"
 
 
+def identifiability_sentence(identifiability: Identifiability) -> str:
+    """Return how well a query from the mean cell is placed."""
+    return (
+        f"From the mean cell, a {query_name(identifiability.view)} is placed within "
+        f"{identifiability.radius:g} m with a chance of "
+        f"{short_percent(float(identifiability.found.mean()))}"
+    )
+
+
 def identifiability_tables(
     identifiability: Identifiability, *, object_counts: Mapping[int, int] | None = None
 ) -> tuple[Table, ...]:
@@ -119,9 +128,8 @@ def identifiability_page(
     return Report(
         title=f"Where a query can be placed in {name}",
         headline=(
-            f"From the mean cell, a {query} is placed within "
-            f"{facts['radius_m']:g} m with a chance of {short_percent(facts['chance_found'])}; of "
-            f"{check.queries:,} fresh ones, {short_percent(check.found)} were."
+            f"{identifiability_sentence(identifiability)}; of {check.queries:,} fresh ones, "
+            f"{short_percent(check.found)} were."
         ),
         command=command,
         text=(

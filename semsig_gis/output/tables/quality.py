@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 
 ROW_COUNTS = tuple(field.name for field in fields(RowCounts))
+FREQUENT = 3  # classes in the sentence of a load
 NOTES_SHOWN = 4  # per layer; one with many unreadable rows would have too many
 # Tables that are omitted when they have no rows.
 MAY_BE_EMPTY = frozenset({"Conflated", "Layers not read"})
@@ -102,7 +103,7 @@ def _class_table(report: QualityReport) -> Table:
         ("class", "objects", "rows", "per km² of hull", "per km² occupied", "nearest, m"),
         tuple(
             (
-                *(item.class_name, f"{item.objects:,}", f"{item.rows:,}"),
+                *(item.title, f"{item.objects:,}", f"{item.rows:,}"),
                 *map(_decimal_text, (item.per_km2_hull, item.per_km2_occupied, item.nearest_m)),
             )
             for item in report.classes
@@ -144,6 +145,30 @@ def _notes_text(layer_notes: Sequence[str]) -> str:
     notes = list(brief_notes(layer_notes))
     more = len(notes) - NOTES_SHOWN
     return "; ".join([*notes[:NOTES_SHOWN], *([f"and {more} more (--json)"] if more > 0 else [])])
+
+
+def quality_sentence(report: QualityReport) -> str:
+    """Return the number of objects of a load, on how much ground, and the frequent classes."""
+    frequent = sorted(report.classes, key=lambda item: -item.objects)[:FREQUENT]
+    names = ", ".join(f"{item.title.lower()} ({item.objects:,})" for item in frequent)
+    rest = len(report.classes) - len(frequent)
+    more = f" and {rest:,} more class{'es' if rest > 1 else ''}" if rest else ""
+    return (
+        f"{_many(report.objects, 'street object')} of {_many(len(report.classes), 'class', 'es')} "
+        f"on {report.hull_km2:,.2g} km²: {names}{more}."
+    )
+
+
+def _many(number: int, noun: str, ending: str = "s") -> str:
+    return f"{number:,} {noun}{'' if number == 1 else ending}"
+
+
+def update_sentence(report: UpdateReport) -> str:
+    """Return how many cells an update changed."""
+    return (
+        f"{report.changed:,} of {report.cells:,} cells changed, {report.appeared:,} appeared and "
+        f"{report.vanished:,} vanished: the city has drifted by {percent(report.share, 2)}."
+    )
 
 
 CLASS_COUNTS = ("before", "after", "added", "removed", "moved", "gained", "lost")

@@ -8,11 +8,13 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from semsig_gis.core import Table, one_line
+from semsig_gis.core import LIKELIHOOD, Table, one_line
+from semsig_gis.localization import LikelihoodMethod
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from semsig_gis.localization import AnyMethod
     from semsig_gis.output.report_model import Number
 
 
@@ -51,6 +53,22 @@ def brief_notes(notes: Iterable[str]) -> Iterator[str]:
             yield from (first, *others)
         else:
             yield f"{first}; and {len(others)} more (--json)" if others else first
+
+
+def method_words(method: AnyMethod) -> str:
+    """Return a method for people: ``likelihood, noise: generic, from the centres of cells``."""
+    if not isinstance(method, LikelihoodMethod):
+        return str(method)
+    sigma = method.north_sigma
+    settings = {
+        "searched between the centres of cells": method.refined,
+        "from the centres of cells": method.on_grid,
+        "surely from this area": method.surely_here,
+        f"north ± {sigma:g}°": 0.0 < sigma < math.inf,
+        "north unknown": sigma == math.inf,
+    }
+    given = (name for name, applies in settings.items() if applies)
+    return ", ".join([LIKELIHOOD, f"noise: {method.noise.name}", *given])
 
 
 KILOMETRE = 1000.0

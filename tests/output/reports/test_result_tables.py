@@ -124,6 +124,7 @@ COUNTS = RowCounts(
 )
 BENCHES = ClassQuality(
     class_name="bench",
+    title="Bench",
     objects=1300,
     rows=1400,
     per_km2_hull=None,
@@ -209,7 +210,7 @@ def test_properties_of_a_database_match_a_count_by_hand() -> None:
     assert properties["Signatures"] == ("6", "312,134")
     assert properties["Largest group by type"] == ("DD, 3 cells", "DDD, 29,958 cells")
     assert groups["count"] == ("3", "3", "4", "140,296", "204,891")
-    assert groups["cells alone in their group"][:3] == ("16.7 %", "16.7 %", "33.3 %")
+    assert groups["cells in a group of one"][:3] == ("16.7 %", "16.7 %", "33.3 %")
     # Seven in six cells, where each cell sees 2,827 m2.
     assert classes["Street light (D)"] == ("30", "412.6", "1.459")
     outdoor = replace(SIX, viewpoints=ViewpointSpec(mode="outdoor"))
