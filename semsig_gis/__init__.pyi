@@ -68,6 +68,7 @@ from .localization import (
     cell_noise as cell_noise,
     learn_noise as learn_noise,
     localize as localize,
+    localize_many as localize_many,
     locate as locate,
     locate_route as locate_route,
     named_noise as named_noise,

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from semsig_gis.commands.cities import locate_in_cities, split_databases
 from semsig_gis.commands.model import Option, Reporter, Result, command
@@ -282,16 +282,10 @@ class Localize(SearchOptions, QueryOptions):
         """Return a locator that also uses classes seen without a direction and absent classes."""
         if not unplaced and not absent:
             return locator
-        if self.ranking != LIKELIHOOD:
-            what = "objects with and without a direction" if unplaced else "absent objects"
-            raise InputError(
-                f"the query has {what}, which the method {self.ranking!r} cannot take; give "
-                "directions to all objects or to none, or leave out the method."
-            )
         from semsig_gis.localization import with_unplaced
 
-        likelihood: Any = locator
-        return with_unplaced(likelihood, query, unplaced, absent=absent)
+        any_locator: Any = locator
+        return cast("Locator[Any]", with_unplaced(any_locator, query, unplaced, absent=absent))
 
     def _adapted(
         self, city: City, lines: Iterable[QueryLine], north: North, reporter: Reporter

@@ -229,6 +229,11 @@ class SignatureDatabase(Displayed):
         """Number of cells with the angle-level sequence of each cell, shape (n,)."""
         return read_only(self.angle_sequences.counts[self.angle_sequences.inverse])
 
+    @cached_property
+    def kept(self) -> list[Any]:
+        """What other packages computed from the database and keep with it, such as an index."""
+        return []
+
     def cells_at(self, xy: ArrayLike) -> NDArray[np.int64]:
         """Return the rows of the cells that contain places, -1 for places in no cell, shape (p,).
 

@@ -113,6 +113,7 @@ from .locator import AnyMethod as AnyMethod
 from .locator import Locator as Locator
 from .locator import UsualLocator as UsualLocator
 from .locator import localize as localize
+from .locator import localize_many as localize_many
 from .locator import make_locator as make_locator
 from .locator import method_index as method_index
 from .locator import parse_method as parse_method

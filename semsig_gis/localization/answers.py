@@ -122,11 +122,21 @@ class Answer(Displayed):
         """The best place in words: ``on High Street, near Town Hall``; empty if unknown."""
         return "" if self.place_name is None else self.place_name(*self.xy)
 
+    @cached_property
+    def latlon(self) -> tuple[float, float]:
+        """Latitude and longitude of the best place in degrees (WGS 84), rounded to 1 cm."""
+        lon, lat = to_degrees(self.crs).transform(*self.xy)
+        return round(lat, 7), round(lon, 7)
+
+    @property
+    def chance(self) -> float | None:
+        """The chance of the best place; None if the method gives no probabilities."""
+        return None
+
     @property
     def links(self) -> dict[str, str]:
         """Addresses of public maps and street-level photographs of the best place, by title."""
-        lon, lat = to_degrees(self.crs).transform(*self.xy)
-        return place_links(lat, lon)
+        return place_links(*self.latlon)
 
     @cached_property
     def candidates(self) -> pd.DataFrame:

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar, Unpack, overload
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Literal,
+    Protocol,
+    TypeAlias,
+    TypeVar,
+    Unpack,
+    cast,
+    overload,
+)
 
 import numpy as np
 
-from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD
-from semsig_gis.database import City, PartitionedDatabase, join_databases
+from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD, InputError, each_in_order
+from semsig_gis.database import City, PartitionedDatabase, join_databases, open_city
 from semsig_gis.localization.answers import Answer
 from semsig_gis.localization.noise.model import cell_noise
 from semsig_gis.localization.noise.presets import NOISES
-from semsig_gis.observation import GRID_NORTH, View
+from semsig_gis.observation import GRID_NORTH, View, read_seen
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from semsig_gis.core import Signature
     from semsig_gis.database import SignatureDatabase
@@ -26,17 +38,22 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.locate import (
         LikelihoodLocator,
+        LikelihoodOptions,
         LocateOptions,
         Location,
     )
     from semsig_gis.localization.likelihood.method import LikelihoodMethod
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.requirement import Requirement
-    from semsig_gis.observation import North
+    from semsig_gis.observation import AnySeen, North
 
     Cells: TypeAlias = SignatureDatabase | PartitionedDatabase | City
+    Where: TypeAlias = str | Path | Cells
 
 AnyMethod: TypeAlias = "Method | LikelihoodMethod"
+
+KEPT_INDEXES = 4
+"""Number of indexes that a database keeps: one for each noise that is usual for some views."""
 
 # Imports of one kind of method are in functions: they take 0.1 s for each kind, and a process
 # answers by one of them.
@@ -213,27 +230,36 @@ class UsualLocator:
 
 
 def method_index(database: SignatureDatabase, method: LikelihoodMethod) -> LikelihoodIndex:
-    """Return the index of a database for a method: from cell centres or from anywhere in a cell."""
+    """Return the index of a database for a method: from cell centres or from anywhere in a cell.
+
+    The database keeps the last of them.
+    """
     from semsig_gis.localization.likelihood.index import build_index  # noqa: PLC0415 - above
 
     noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
-    return build_index(database, noise)
+    kept: list[LikelihoodIndex] = database.kept
+    for index in kept:
+        if index.noise == noise:
+            return index
+    kept[:] = [*kept[1 - KEPT_INDEXES :], build_index(database, noise)]
+    return kept[-1]
 
 
 @overload
 def localize(
-    database: Cells,
-    query: Signature,
+    where: Where,
+    seen: AnySeen,
     *,
     method: LikelihoodMethod | Literal["likelihood"] = DEFAULT_METHOD,
     requirement: Requirement | None = None,
     top: int = 10,
     north: North = GRID_NORTH,
+    **options: Unpack[LikelihoodOptions],
 ) -> Location: ...
 @overload
 def localize(
-    database: Cells,
-    query: Signature,
+    where: Where,
+    seen: AnySeen,
     *,
     method: Method,
     requirement: Requirement | None = None,
@@ -242,75 +268,147 @@ def localize(
 ) -> Localization: ...
 @overload
 def localize(
-    database: Cells,
-    query: Signature,
+    where: Where,
+    seen: AnySeen,
     *,
     method: str,
     requirement: Requirement | None = None,
     top: int = 10,
     north: North = GRID_NORTH,
+    **options: Unpack[LikelihoodOptions],
 ) -> Location | Localization: ...
 def localize(
-    database: Cells,
-    query: Signature,
+    where: Where,
+    seen: AnySeen,
     *,
     method: str | AnyMethod = DEFAULT_METHOD,
     requirement: Requirement | None = None,
     top: int = 10,
     north: North = GRID_NORTH,
+    **options: Unpack[LikelihoodOptions],
 ) -> Location | Localization:
-    """Return the places from which a query may have been seen, as `semsig localize` does.
+    """Return the places from which something may have been seen, as `semsig localize` does.
 
     Parameters
     ----------
-    database : SignatureDatabase, PartitionedDatabase or City
-        The cells. A distance reads a partitioned database one part at a time. The likelihood
-        method also searches between the centres of cells if a city has a store of street objects.
-    query : Signature
-        The objects that a person or a detector saw, possibly none; types or bearings may be
-        unknown. Objects of a class that no cell sees are not used, with a note in the answer.
+    where : str, Path, City, SignatureDatabase or PartitionedDatabase
+        The cells: the file or folder of a database, or one that is open, which is faster from the
+        second question on. A distance reads a partitioned database one part at a time. The
+        likelihood method also searches between the centres of cells if there are street objects.
+    seen : str, iterable, dict or Signature
+        What a person or a detector saw: a sentence, a list of pairs of class and bearing, a row as
+        `parse_view` takes it, or a view. Objects of a class that no cell sees are not used, with a
+        note in the answer.
     method : str, Method or LikelihoodMethod, default "likelihood"
         How the cells are ranked, or its text (see `parse_method`), such as ``"edit+edit:5%"``. A
-        fusion uses one part if the query has only this one. The noise of ``"likelihood"`` depends
-        on the query: that of photographs for a view of sectors, that of panoramas for a full turn
-        with scores of a detector, and otherwise ``"generic"``.
+        fusion uses one part if the view has only this one. The noise of ``"likelihood"`` depends
+        on what was seen: ``"by-hand"`` for words, that of photographs for a view of sectors, that
+        of panoramas for a full turn with scores of a detector, and otherwise ``"generic"``.
     requirement : Requirement, optional
         The objects that a candidate cell must see; none by default.
     top : int, default 10
         Number of cells to list, at least 1.
     north : North, optional
-        The north from which the bearings of the query are measured; grid north by default.
+        The north from which the bearings are measured; grid north by default.
+    **options : LikelihoodOptions
+        Further settings of the likelihood method, as in `locate`; ``explained`` is 1 by default.
 
     Returns
     -------
     Location or Localization
-        The answer by likelihood, with probabilities (`locate` has more options), or by distance,
-        with ties.
+        The answer by likelihood, with probabilities, or by distance, with ties.
 
     Raises
     ------
     InputError
-        If the query has no part that the method compares, the method needs street objects but the
-        city has none, no cell meets the requirement, or `top` is below 1.
+        If what was seen cannot be read or has no part that the method compares, the method needs
+        street objects but the city has none, no cell meets the requirement, `top` is below 1, or a
+        distance is given an option of the likelihood method.
     UnknownNameError
-        If the text of the method has an unknown name.
+        If a class or the text of the method has an unknown name.
+    DatabaseError
+        If there is no database at the path.
     EmptyResultError
         If no cell meets the requirement and the method is a distance.
 
     Examples
     --------
+    >>> answer = localize(demo_database, "bench at 40, lamp at 120, tree at 200")
+    >>> [round(degrees, 2) for degrees in answer.latlon], 0 < answer.chance < 1
+    ([48.75, 3.0], True)
     >>> longest = int(demo_database.lengths.argmax())
-    >>> query = demo_database.signature(longest)
-    >>> answer = localize(demo_database, query)
+    >>> answer = localize(demo_database, demo_database.signature(longest))
     >>> answer.answer.given, answer.answer.cell == longest
     (True, True)
-    >>> answer = localize(demo_database, query, method="edit+edit:5%", top=3)
-    >>> answer.used, answer.candidates["distance"][0]
-    ('types+angles', np.float64(0.0))
+    >>> pairs = [("bench", 40), ("lamp", 120)]
+    >>> answer = localize(demo_database, pairs, method="edit+edit:5%", top=3)
+    >>> answer.used
+    'types+angles'
     """
-    if method == LIKELIHOOD:
-        method = f"{LIKELIHOOD}:{usual_noise(query)}"
-    if isinstance(method, str):
-        method = parse_method(method)
-    locator = make_locator(database, method, requirement=requirement, top=top, north=north)
-    return locator.locate(query)
+    settings: dict[str, Any] = {"requirement": requirement, "top": top, "north": north, **options}
+    (answer,) = localize_many(where, [seen], method=method, **settings)
+    return cast("Location | Localization", answer)
+
+
+def localize_many(
+    where: Where,
+    views: Iterable[AnySeen],
+    *,
+    method: str | AnyMethod = DEFAULT_METHOD,
+    requirement: Requirement | None = None,
+    top: int = 10,
+    north: North = GRID_NORTH,
+    **options: Unpack[LikelihoodOptions],
+) -> Iterator[Any]:
+    """Return the answers to many questions, one by one and in order, computed in parallel.
+
+    Parameters
+    ----------
+    where, method, requirement, top, north, **options
+        As in `localize`.
+    views : iterable
+        What was seen, each as in `localize`. One that cannot be read raises its error in its turn.
+
+    Returns
+    -------
+    iterator of Location or Localization
+        The answers. One by likelihood holds the chances of all cells: keep only what is needed of
+        each.
+
+    Examples
+    --------
+    >>> views = ["bench at 40, lamp at 120", [("tree", 10), ("lamp", 200)]]
+    >>> [len(answer.query) for answer in localize_many(demo_database, views)]
+    [2, 2]
+    """
+    cells = open_city(where) if isinstance(where, str | Path) else where
+    dataset = cells.dataset if isinstance(cells, City) else cells
+    usual = method == LIKELIHOOD
+    given = parse_method(method) if isinstance(method, str) else method
+    if options and given.noise is None:
+        raise InputError(
+            f"{' and '.join(options)} {'works' if len(options) == 1 else 'work'} only with the "
+            f"likelihood method, not with {str(given)!r}; leave out one or the other."
+        )
+
+    @cache
+    def locator_for(noise: str) -> Any:  # noqa: ANN401 - a locator of either kind
+        own = parse_method(f"{LIKELIHOOD}:{noise}") if noise else given
+        return make_locator(
+            cells, own, requirement=requirement, **{"top": top, "north": north, **options}
+        )
+
+    def answer(item: AnySeen) -> Location | Localization:
+        seen = read_seen(item, taxonomy=dataset.taxonomy, radius=dataset.spec.radius)
+        noise = ("by-hand" if seen.in_words else usual_noise(seen.view)) if usual else ""
+        locator = locator_for(noise)
+        if seen.unplaced or seen.absent:
+            from semsig_gis.localization.suggest import with_unplaced  # noqa: PLC0415 - geopandas
+
+            locator = with_unplaced(locator, seen.view, seen.unplaced, absent=seen.absent)
+        has_bearings = seen.view.bearings is not None  # which explanations need
+        if given.noise is not None and "explained" not in options and has_bearings:
+            locator = replace(locator, explained=1)
+        return cast("Location | Localization", locator.locate(seen.view))
+
+    return each_in_order(answer, views)

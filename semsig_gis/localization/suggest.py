@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from typing_extensions import TypedDict
 
-from semsig_gis.core import BEARING_UNITS, FULL_TURN
+from semsig_gis.core import BEARING_UNITS, FULL_TURN, InputError
+from semsig_gis.localization.distance.search import DistanceLocator
 from semsig_gis.localization.likelihood.priors import weight_prior
 from semsig_gis.observation import View
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.observation import Photo
 
+
+_Locator = TypeVar("_Locator", "LikelihoodLocator", DistanceLocator)
 
 LOOKED_FOR = 0.95
 """Minimum probability that a person who looks for an object detects it."""
@@ -229,15 +232,24 @@ def unplaced_prior(
 
 
 def with_unplaced(
-    locator: LikelihoodLocator,
+    locator: _Locator,
     query: Signature,
     unplaced: Sequence[int] = (),
     *,
     absent: Sequence[int] = (),
-) -> LikelihoodLocator:
-    """Return a locator with the evidence of undirected and absent objects added to its prior."""
+) -> _Locator:
+    """Return a locator with the evidence of undirected and absent objects added to its prior.
+
+    InputError if there are any, and the locator is one by distance.
+    """
     if not unplaced and not absent:
         return locator
+    if isinstance(locator, DistanceLocator):
+        what = "objects with and without a direction" if unplaced else "absent objects"
+        raise InputError(
+            f"the query has {what}, which the method {str(locator.method)!r} cannot take; give "
+            "directions to all objects or to none, or leave out the method."
+        )
     by_code = locator.index.database.taxonomy.by_code
     grid_query = locator.north.to_grid(query)
     headings = locator.scan(query).headings if absent and _has_sectors(query) else (None,)

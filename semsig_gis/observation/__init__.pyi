@@ -36,6 +36,9 @@ from .north import GRID_NORTH as GRID_NORTH
 from .north import North as North
 from .north import NorthRecord as NorthRecord
 from .north import declination as declination
+from .seen import AnySeen as AnySeen
+from .seen import Seen as Seen
+from .seen import read_seen as read_seen
 from .sentences import GUESS_ERROR as GUESS_ERROR
 from .sentences import RADIUS_M as RADIUS_M
 from .sentences import SEEN as SEEN

@@ -10,7 +10,7 @@ from sentences import refused
 from worlds import random_town, save_town
 
 import semsig_gis
-from semsig_gis.core import DEFAULT_METHOD, PAPER_METHOD, InputError
+from semsig_gis.core import DEFAULT_METHOD, PAPER_METHOD, InputError, UnknownNameError, percent
 from semsig_gis.database import open_city
 from semsig_gis.evaluation import evaluate
 from semsig_gis.localization import (
@@ -20,10 +20,13 @@ from semsig_gis.localization import (
     build_index,
     cell_noise,
     localize,
+    localize_many,
     locate,
+    method_index,
     named_noise,
     parse_method,
 )
+from semsig_gis.observation import parse_view
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,7 +46,7 @@ def test_default_method_is_likelihood() -> None:
 
 
 def test_database_is_searched_by_likelihood() -> None:
-    assert localize(CITY, QUERY).to_dict() == locate(INDEX, QUERY).to_dict()
+    assert localize(CITY, QUERY).to_dict() == locate(INDEX, QUERY, explained=1).to_dict()
     limited = localize(CITY, QUERY, requirement=Requirement.parse("?<=3", CITY.taxonomy))
     assert limited.candidates["length"].max() <= 3
     with refused(InputError, "store"):
@@ -52,13 +55,112 @@ def test_database_is_searched_by_likelihood() -> None:
 
 def test_place_is_refined_between_cells_of_city(tmp_path: Path) -> None:
     city = open_city(save_town(tmp_path, TOWN))
-    refined = locate(INDEX, QUERY, store=city.store, refined=True)
+    refined = locate(INDEX, QUERY, store=city.store, refined=True, explained=1)
     assert localize(city, QUERY).to_dict() == refined.to_dict()
     on_grid = localize(city, QUERY, method=LikelihoodMethod.parse("likelihood:generic:on_grid"))
     assert on_grid.answer.cell == LONGEST
     assert localize(city, QUERY, method=PAPER_METHOD).to_dict() == (
         localize(CITY, QUERY, method=Method.parse(PAPER_METHOD)).to_dict()
     )
+
+
+SENTENCE = "bench at 40, street light at 120, tree at 200"
+PAIRS = [("bench", 40), ("street light", 120), ("tree", 200)]
+DETECTIONS = [{"class": name, "bearing": bearing} for name, bearing in PAIRS]
+
+
+def test_every_form_of_a_view_gives_the_same_answer(tmp_path: Path) -> None:
+    path = save_town(tmp_path, TOWN)
+    view = parse_view({"see": SENTENCE}, taxonomy=CITY.taxonomy)
+    by_hand = localize(open_city(path), view, method="likelihood:by-hand").to_dict()
+    for where in (path, str(path), open_city(path)):
+        for seen in (SENTENCE, PAIRS, {"see": SENTENCE}):
+            assert localize(where, seen).to_dict() == by_hand
+    # Rows are those of a detector.
+    generic = localize(path, view).to_dict()
+    assert generic["noise"] == "generic"
+    for seen in (DETECTIONS, {"detections": DETECTIONS}):
+        assert localize(path, seen).to_dict() == generic
+
+
+def test_class_names_and_ranges_need_no_bearings() -> None:
+    answer = localize(CITY, ["bench", "tree"])
+    assert answer.query.bearings is None
+    with refused(InputError, "no explanation"):
+        answer.explain()
+    far, near = (localize(CITY, [("tree", 0, metres)]) for metres in (25, 3))
+    assert far.to_dict() != near.to_dict()
+
+
+def test_absent_and_undirected_objects_are_used() -> None:
+    known = localize(CITY, f"{SENTENCE}, bus stop, no fountain").to_dict()["prior"]
+    assert known is not None
+    assert known["seen"] == ["bus stop"]
+    assert len(known["absent"]) == 1
+    with refused(InputError, "edit", "directions"):
+        localize(CITY, f"{SENTENCE}, bus stop", method=PAPER_METHOD)
+
+
+def test_answer_says_where_and_why(tmp_path: Path) -> None:
+    answer = localize(open_city(save_town(tmp_path, TOWN)), QUERY)
+    place = answer.to_dict()["place"]
+    assert answer.latlon == (place["lat"], place["lon"])
+    assert answer.chance == place["chance"]
+    for text in (f"{answer.latlon[0]:.5f}", percent(answer.chance)):
+        assert text in repr(answer)
+        assert text in answer._repr_html_()
+    table = answer.explain()
+    assert list(table) == ["you said", "is there", "verdict", "chance"]
+    assert (table["verdict"][: len(QUERY)] == "is there").all()
+    first = CITY.taxonomy.by_code(int(QUERY.codes[0])).title.lower()
+    assert table["you said"][0] == f"{first} at {QUERY.bearings[0]:.0f}°"
+    assert table["is there"][0].startswith(first)
+    distances = localize(CITY, QUERY, method=PAPER_METHOD)
+    assert distances.chance is None
+    assert distances.latlon == pytest.approx(answer.latlon, abs=1e-3)
+
+
+def test_database_keeps_the_last_indexes() -> None:
+    database = random_town().database
+    methods = [parse_method(f"likelihood:{name}") for name in ("generic", "light", "medium")]
+    indexes = [method_index(database, method) for method in methods]
+    assert [method_index(database, method) for method in methods] == indexes
+    for name in ("strong", "by-hand", "photo"):
+        method_index(database, parse_method(f"likelihood:{name}"))
+    assert method_index(database, methods[2]) is indexes[2]
+    assert method_index(database, methods[0]) is not indexes[0]
+
+
+def test_many_questions_are_answered_in_order() -> None:
+    views = [SENTENCE, PAIRS[:2], QUERY]
+    answers = localize_many(CITY, iter(views), top=3)
+    assert [answer.to_dict() for answer in answers] == [
+        localize(CITY, view, top=3).to_dict() for view in views
+    ]
+    answers = localize_many(CITY, [SENTENCE, "dragon at 40", SENTENCE])
+    next(answers)
+    with refused(UnknownNameError, "dragon"):
+        next(answers)
+
+
+@pytest.mark.parametrize(
+    ("seen", "parts"),
+    [
+        ("  ", ("empty", "sentence")),
+        (7, ("type int", "sentence")),
+        ([("bench", 40, 12, 3)], ("('bench', 40, 12, 3)", "bearing")),
+        ([8], ("8 is not", "bearing")),
+        ({"seen": "bench at 40"}, ("keys seen", "nearest is 'see'")),
+    ],
+)
+def test_other_forms_of_a_view_are_refused(seen: Any, parts: tuple[str, ...]) -> None:  # noqa: ANN401 - any value of a user
+    with refused(InputError, *parts):
+        localize(CITY, seen)
+
+
+def test_options_of_the_likelihood_are_refused_for_a_distance() -> None:
+    with refused(InputError, "north_sigma", "likelihood"):
+        localize(CITY, QUERY, method=PAPER_METHOD, north_sigma=10.0)
 
 
 @pytest.mark.parametrize("method", [DEFAULT_METHOD, PAPER_METHOD])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core import EmptyResultError, crs_label, map_with
+from semsig_gis.core import EmptyResultError, map_with
 from semsig_gis.database import PartitionedDatabase, join_databases, rows_of_result
 from semsig_gis.localization.answers import (
     Answer,
@@ -97,7 +97,8 @@ class Localization(Answer):
         if len(columns["cell"]):
             best = {
                 "best cell": columns["cell_id"][0],
-                "place": f"{columns['x'][0]:.1f}, {columns['y'][0]:.1f}",
+                "place": f"{self.latlon[0]:.5f}, {self.latlon[1]:.5f}",
+                **({"which is": self.place} if self.place else {}),
                 "distance": f"{columns['distance'][0]:.3f}",
                 "as good": columns["tied"][0],
             }
@@ -106,7 +107,6 @@ class Localization(Answer):
             "candidates": len(columns["cell"]),
             "cells": self.cells,
             "method": self.method,
-            "CRS": crs_label(self.crs),
         }
 
     @property

@@ -39,6 +39,14 @@ LEAST_INSIDE = 0.5  # chance that the bearing of an object is in a sector, to co
 Verdict = Literal["matched", "misnamed", "missed", "false"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 OUTSIDE = "outside"
+IN_WORDS = {
+    "matched": "is there",
+    "misnamed": "is another thing",
+    "missed": "was not mentioned",
+    "false": "is not there",
+    OUTSIDE: "was not looked at",
+}
+"""The verdicts as a person reads them."""
 ROW_NUMBERS = ("query", "photo", "object")
 
 

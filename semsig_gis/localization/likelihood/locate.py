@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
-from semsig_gis.core import InputError, cell_ids, crs_label, map_with, percent, to_degrees
+from semsig_gis.core import InputError, cell_ids, map_with, percent, to_degrees
 from semsig_gis.localization.answers import (
     LEAST_ELSEWHERE,
     REGION_SHARE,
@@ -35,7 +35,12 @@ from semsig_gis.localization.likelihood.elsewhere import (
     goodness_of_fit,
 )
 from semsig_gis.localization.likelihood.estimate import cell_estimate, refined_estimate
-from semsig_gis.localization.likelihood.explain import explain, explain_cell
+from semsig_gis.localization.likelihood.explain import (
+    IN_WORDS,
+    UNKNOWN_NAME,
+    explain,
+    explain_cell,
+)
 from semsig_gis.localization.likelihood.index import CellScores, photo_power
 from semsig_gis.localization.likelihood.posterior import (
     DIVIDED_PARTS,
@@ -49,6 +54,7 @@ from semsig_gis.observation import GRID_NORTH, View
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    import pandas as pd
     from numpy.typing import NDArray
 
     from semsig_gis.core import MapFrame, Signature
@@ -157,10 +163,12 @@ class Location(Answer):
     def _facts(self) -> dict[str, object]:
         sure = self.answer.given
         region = {"region": f"{len(self.region):,} of {self.cells:,} cells"}
+        lat, lon = self.latlon
         place = {
-            "place" if sure else "best place": f"{self.estimate.x:.1f}, {self.estimate.y:.1f}",
+            "place" if sure else "best place": f"{lat:.5f}, {lon:.5f}",
+            **({"which is": self.place} if self.place else {}),
             "give or take" if sure else "if there, give or take": f"{self.estimate.sigma:.1f} m",
-            f"within {self.rule.radius:g} m": percent(self.answer.mass),
+            f"within {self.rule.radius:g} m": percent(self.chance),
         }
         return {
             "answer": "yes" if sure else "cannot tell",
@@ -168,7 +176,6 @@ class Location(Answer):
             **(place | region if sure else region | place),
             "candidates": len(self.columns["cell"]),
             "noise": self.noise,
-            "CRS": crs_label(self.crs),
         }
 
     def doubted(self, elsewhere: float, fit: float | None = None) -> Location:
@@ -226,6 +233,44 @@ class Location(Answer):
         """Longitude and latitude of the estimated place, rounded to 1 cm."""
         lon, lat = to_degrees(self.crs).transform(self.estimate.x, self.estimate.y)
         return round(lon, 7), round(lat, 7)
+
+    @property
+    def chance(self) -> float:
+        """The chance of being within the radius of `rule`, 50 m, of the best place."""
+        return self.answer.mass
+
+    def explain(self) -> pd.DataFrame:
+        """Return what was seen next to what stands there, for the likeliest place.
+
+        The columns are ``you said``, ``is there``, the ``verdict`` in words and its ``chance``.
+        InputError if the answer has no explanations: they need bearings.
+        """
+        import pandas as pd  # noqa: PLC0415 - it takes 0.25 s
+
+        if not self.explanations:
+            raise InputError(
+                "the answer has no explanation; give the bearings of what was seen, and ask with "
+                "explained=1."
+            )
+
+        def described(name: str | None, bearing: float | None, metres: float | None) -> str:
+            if name is None:
+                return ""
+            known = name != UNKNOWN_NAME
+            title = self.taxonomy.by_name(name).title.lower() if known else "something"
+            at = "" if bearing is None else f" at {bearing:.0f}°"
+            return f"{title}{at}" + ("" if metres is None else f", {metres:.0f} m")
+
+        rows = [
+            (
+                described(row["query_class"], row["query_bearing"], row["query_range"]),
+                described(row["object_class"], row["object_bearing"], row["distance"]),
+                IN_WORDS[row["verdict"]],
+                round(row["chance"], 2),
+            )
+            for row in self.explanations[0].to_dict(self.north)["rows"]
+        ]
+        return pd.DataFrame(rows, columns=["you said", "is there", "verdict", "chance"])
 
     @property
     def chances(self) -> NDArray[np.float64]:
@@ -603,20 +648,25 @@ class LikelihoodLocator:
         )
 
 
-class LocateOptions(TypedDict, total=False):
-    """The settings of answers; `locate` describes them."""
+class LikelihoodOptions(TypedDict, total=False):
+    """The settings of answers that only the likelihood method has; `locate` describes them."""
 
     north_sigma: float
     log_prior: NDArray[np.float64] | None
     rule: AnswerRule
-    top: int
     store: ObjectStore | None
     refined: bool | None
     explained: int
     known: Mapping[str, Any]
-    north: North
     surely_here: bool
     place_name: Callable[[float, float], str] | None
+
+
+class LocateOptions(LikelihoodOptions, total=False):
+    """The settings of answers; `locate` describes them."""
+
+    top: int
+    north: North
 
 
 def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOptions]) -> Location:

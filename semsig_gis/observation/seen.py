@@ -1,0 +1,121 @@
+"""Read what was seen from any form: a sentence, pairs of class and bearing, a row, or a view."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from semsig_gis.core import InputError, Signature, nearest_name
+from semsig_gis.observation.sentences import (
+    RADIUS_M,
+    SEEN,
+    parse_view,
+    text_row,
+    unplaced_codes,
+)
+from semsig_gis.storage import row_value
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.storage import Row
+
+AnySeen: TypeAlias = "str | Signature | Row | Iterable[str | Row | tuple[object, ...]]"
+"""What was seen, in a form that `read_seen` takes."""
+
+DETECTION = ("class", "bearing", "range")
+FORMS = (
+    "give a sentence such as 'bench at 40, tree at 120', a list of pairs such as [('bench', 40), "
+    "('tree', 120)], a dict as parse_view takes it, or a View"
+)
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Seen:
+    """A view, and what else is known of it.
+
+    `unplaced` and `absent` are the class codes of objects that were seen in an unknown direction,
+    and that are not in sight; `in_words` is whether a person named the objects.
+    """
+
+    view: Signature
+    unplaced: tuple[int, ...] = ()
+    absent: tuple[int, ...] = ()
+    in_words: bool = False
+
+
+def read_seen(seen: AnySeen, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Seen:
+    """Read what was seen; InputError if it has another form, UnknownNameError for other classes.
+
+    Parameters
+    ----------
+    seen : str, iterable, dict or Signature
+        A sentence; a list of class names, or of pairs of a name and a bearing in degrees, perhaps
+        with a distance; a row as `parse_view` takes it; or a view.
+    taxonomy : Taxonomy
+        The classes.
+    radius : float, default 30
+        As in `parse_view`.
+
+    Returns
+    -------
+    Seen
+        The view.
+
+    Examples
+    --------
+    >>> from semsig_gis import paper_taxonomy
+    >>> from semsig_gis.observation import read_seen
+    >>> seen = read_seen("bench at 40, lamp at 80, no bus stop", taxonomy=paper_taxonomy())
+    >>> seen.view.bearings.tolist(), seen.absent
+    ([40.0, 80.0], (11,))
+    >>> pairs = [("bench", 40), ("lamp", 80)]
+    >>> read_seen(pairs, taxonomy=paper_taxonomy()).view.codes.tolist()
+    [10, 3]
+    """
+    if isinstance(seen, Signature):
+        return Seen(view=seen)
+    if isinstance(seen, str):
+        if not seen.strip():
+            raise InputError(f"the text of what was seen is empty; {FORMS}.")
+        row, in_words = text_row(seen, taxonomy), True
+    elif isinstance(seen, Mapping):
+        row, in_words = dict(seen), "see" in seen
+        if all(row.get(name) is None for name in SEEN):
+            near = nearest_name(next(map(str, row), ""), SEEN)
+            raise InputError(
+                f"the keys {', '.join(map(str, row)) or 'of an empty dict'} do not say what was "
+                f"seen{near}; give {', '.join(SEEN[:-1])} or {SEEN[-1]}."
+            )
+    else:
+        items = _items(seen)
+        row = {"detections": [_detection(item) for item in items]}
+        in_words = not any(isinstance(item, Mapping) for item in items)
+    sentence = row_value(row, "see")
+    if sentence is None:
+        return Seen(view=parse_view(row, taxonomy=taxonomy, radius=radius), in_words=in_words)
+    placed, unplaced, absent = unplaced_codes(str(sentence), taxonomy)
+    view = parse_view({**row, "see": placed}, taxonomy=taxonomy, radius=radius)
+    return Seen(view=view, unplaced=unplaced, absent=absent, in_words=in_words)
+
+
+def _items(seen: Any) -> list[Any]:  # noqa: ANN401 - any value of a user
+    try:
+        return list(seen)
+    except TypeError as error:
+        raise InputError(f"what was seen is of type {type(seen).__name__}; {FORMS}.") from error
+
+
+def _detection(item: Any) -> Row:  # noqa: ANN401 - any value of a user
+    """Return a name, a pair or a row as a detection of `parse_view`."""
+    if isinstance(item, Mapping):
+        return dict(item)
+    values = (item,) if isinstance(item, str) else item
+    if isinstance(values, tuple | list) and 1 <= len(values) <= len(DETECTION):
+        return dict(zip(DETECTION, values, strict=False))
+    raise InputError(
+        f"{item!r} is not something that was seen; give a name and a bearing, such as "
+        "('bench', 40), or a distance in metres as well, such as ('bench', 40, 12)."
+    )
