@@ -142,7 +142,7 @@ FORMATS = (
     ),
     Format(
         name="surroundings",
-        file="buildings.parquet",
+        file="objects.buildings.parquet",
         read=lambda path: sg.read_surroundings(path, crs="EPSG:32631", role="buildings"),
     ),
     Format(
@@ -216,8 +216,8 @@ def made_corpus(world: World, folder: Path) -> None:
     shutil.copytree(here / "known.objects", folder / "known.objects")
     shutil.copytree(here / "tiles", folder / "tiles")
     shutil.copytree(here / "known_evaluation", folder / "evaluation")
-    for name in ("objects", "buildings"):
-        shutil.copy2(here / "in" / f"{name}.parquet", folder / f"{name}.parquet")
+    for name in ("objects.parquet", "objects.buildings.parquet"):
+        shutil.copy2(here / "in" / name, folder / name)
     (folder / "fuzz.toml").write_text(_CATALOG, encoding="utf-8")
     noise = tomllib.loads((folder / "noise.toml").read_text(encoding="utf-8"))
     (folder / "noise.json").write_text(json.dumps(noise), encoding="utf-8")

@@ -13,9 +13,13 @@ from semsig_gis.commands.options import MOST_METRES, Scheduler, Workers, numbers
 from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from semsig_gis.objects import StreetObjects
+
+
+Role = Literal["buildings", "streets"]
+ROLES: tuple[Role, ...] = ("buildings", "streets")
 
 
 @command("build", title="Build signature database", group="Databases", order=1, returns=Properties)
@@ -74,16 +78,36 @@ class Build:
             "Corner of a cell in metres, in the CRS of the objects.", metavar="X,Y", advanced=True
         ),
     ] = "0,0"
+    ground: Annotated[
+        bool,
+        Option(
+            "Use the buildings and streets that `semsig load` wrote next to the street objects.",
+            title="Buildings and streets of the street objects",
+        ),
+    ] = True
     buildings: Annotated[
-        Path | None, Option("Building footprints that hide what is behind them.", reads=True)
+        Path | None,
+        Option(
+            "Building footprints that hide what is behind them.",
+            default="next to the street objects, if there are any",
+            reads=True,
+        ),
     ] = None
     streets: Annotated[
-        Path | None, Option("Centre lines, for viewpoints near streets.", reads=True)
+        Path | None,
+        Option(
+            "Centre lines of streets, for maps, names of places and viewpoints near streets.",
+            default="next to the street objects, if there are any",
+            reads=True,
+        ),
     ] = None
     viewpoints: Annotated[
-        Literal["all", "outdoor", "streets"],
-        Option("Viewpoints: every cell, outdoor cells or cells near streets (needs --streets)."),
-    ] = "all"
+        Literal["all", "outdoor", "streets"] | None,
+        Option(
+            "Viewpoints: every cell, outdoor cells or cells near streets.",
+            default="outdoor where there are buildings, otherwise all",
+        ),
+    ] = None
     street_width: Annotated[
         float,
         Option(
@@ -120,13 +144,17 @@ class Build:
         """Write the database; return its properties."""
         from semsig_gis.core import GridSpec, SignatureSpec
         from semsig_gis.database import TileSpec, ViewpointSpec, build_tiles
-        from semsig_gis.objects import open_objects, read_area
+        from semsig_gis.objects import ground_file, open_objects, read_area
         from semsig_gis.storage import EMPTY_BOX
 
-        if self.streets is not None and self.viewpoints != "streets":
-            raise InputError(
-                "--streets is used only with --viewpoints streets; give both or neither."
-            )
+        found = {
+            role: ground_file(self.objects, role)
+            for role in ROLES
+            if self.ground and getattr(self, role) is None
+        }
+        found = {role: path for role, path in found.items() if path.is_file()}
+        ground = {role: getattr(self, role) for role in ROLES} | found
+        mode = self.viewpoints or ("all" if ground["buildings"] is None else "outdoor")
         in_tiles = self.tile is not None or self.workers or self.scheduler is not None
         if not in_tiles and self.out.suffix.lower() != ".parquet" and not self.out.is_dir():
             raise InputError(f"{self.out} cannot be written; the name must end in .parquet.")
@@ -139,18 +167,17 @@ class Build:
         specs: dict[str, Any] = {
             "grid": grid,
             "spec": spec,
-            "viewpoints": ViewpointSpec(mode=self.viewpoints, width=width, area=polygons),
+            "viewpoints": ViewpointSpec(mode=mode, width=width, area=polygons),
         }
         if not in_tiles:
-            cells, entries = self._build_whole(objects, specs, reporter)
+            cells, entries = self._build_whole(objects, ground, specs, reporter)
         else:
             with reporter.progress("building tiles") as advance:
                 manifest = build_tiles(
                     self.objects,
                     self.out,
                     tile=None if self.tile is None else TileSpec(self.tile),
-                    buildings=self.buildings,
-                    streets=self.streets,
+                    **ground,
                     workers=self.workers,
                     scheduler=self.scheduler,
                     progress=advance,
@@ -163,10 +190,15 @@ class Build:
             properties,
             summary=self._summary(cells, entries),
             files={"signature database": self.out},
+            notes=[self._found_note(found, mode)] if found else [],
         )
 
     def _build_whole(
-        self, objects: StreetObjects, specs: dict[str, Any], reporter: Reporter
+        self,
+        objects: StreetObjects,
+        ground: dict[Role, Path | None],
+        specs: dict[str, Any],
+        reporter: Reporter,
     ) -> tuple[int, int]:
         """Write a database in one file with its object store; return its cells and entries."""
         from semsig_gis.database import ObjectStore, build_database, save_with_store
@@ -174,12 +206,13 @@ class Build:
 
         notes: list[str] = []
         read = partial(read_surroundings, crs=objects.crs, tell=notes.append)
-        houses = None if self.buildings is None else read(self.buildings, role="buildings")
-        lines = None if self.streets is None else read(self.streets, role="streets")
+        houses, lines = (
+            None if path is None else read(path, role=role) for role, path in ground.items()
+        )
         if houses is not None and (invalid := int((~houses.is_valid).sum())):
             notes.append(
-                f"{invalid} building footprints in {self.buildings} are invalid polygons; they "
-                "were repaired"
+                f"{invalid} building footprints in {ground['buildings']} are invalid polygons; "
+                "they were repaired"
             )
         for note in notes:
             reporter.remark(note)
@@ -191,6 +224,15 @@ class Build:
         store = ObjectStore.of(objects, footprints=houses, streets=lines)
         save_with_store(database, store, self.out)
         return len(database), len(database.codes)
+
+    def _found_note(self, found: Mapping[Role, Path], mode: str) -> str:
+        """Return a sentence on the files that were used without being named."""
+        files = " and ".join(map(str, found.values()))
+        effect = ""
+        if "buildings" in found:
+            outdoor = "" if self.viewpoints else f", and the viewpoints are {mode}"
+            effect = f"; buildings hide what is behind them{outdoor}"
+        return f"with the {' and '.join(found)} of {files}{effect} (--no-ground: without them)"
 
     def _summary(self, cells: int, entries: int) -> Iterator[str]:
         from semsig_gis.database import open_city

@@ -81,7 +81,7 @@ class Fetch(LoadOptions):
             catalog,
             self.layer or (),
             selection=self.selection,
-            surroundings=bool(self.buildings or self.streets),
+            surroundings=self.with_ground,
         )
         store, http = open_cache(
             self.cache, offline=self.offline, deadline_s=self.timeout, tell=reporter.remark

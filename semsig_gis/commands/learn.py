@@ -222,7 +222,9 @@ def learnt_noise(
                 store.objects,
                 radius=database.spec.radius,
                 north_sigma=sigma,
-                footprints=store.buildings_around(places, distance=database.reach),
+                footprints=store.buildings_around(
+                    places, distance=database.reach, occlusion=database.occlusion
+                ),
             )
     # The uncertainty of the sample places is not an error of the detector.
     return replace(estimate, spec=replace(estimate.spec, position_sigma=0.0, name=name))

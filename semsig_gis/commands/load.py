@@ -94,12 +94,30 @@ class LoadOptions:
             advanced=True,
         ),
     ] = False
+    ground: Annotated[
+        bool,
+        Option(
+            "Write the buildings and streets of the source as well, next to --out.",
+            title="Buildings and streets",
+        ),
+    ] = True
     buildings: Annotated[
-        Path | None, Option("Building footprints to write as well (.parquet).", writes=".parquet")
+        Path | None,
+        Option(
+            "Building footprints to write (.parquet).",
+            default="the name of --out with .buildings",
+            writes=".parquet",
+            advanced=True,
+        ),
     ] = None
     streets: Annotated[
         Path | None,
-        Option("Centre lines of streets to write as well (.parquet).", writes=".parquet"),
+        Option(
+            "Centre lines of streets to write (.parquet).",
+            default="the name of --out with .streets",
+            writes=".parquet",
+            advanced=True,
+        ),
     ] = None
     metric_crs: Annotated[
         str | None,
@@ -143,6 +161,11 @@ class LoadOptions:
     ] = True
 
     @property
+    def with_ground(self) -> bool:
+        """Whether buildings and streets are read."""
+        return self.ground or self.buildings is not None or self.streets is not None
+
+    @property
     def selection(self) -> street_objects.Selection:
         """The layers to read by default."""
         if self.all_layers and self.paper_classes:
@@ -153,12 +176,16 @@ class LoadOptions:
         """Write the objects and their surroundings; return their quality report."""
         notes = list(loaded.notes)
         street_objects.save_objects(loaded.objects, self.out)
-        files = {"street objects": self.out}
+        files = {"street objects": self.out} | street_objects.save_ground(
+            self.out,
+            buildings=loaded.buildings if self.ground and self.buildings is None else None,
+            streets=loaded.streets if self.ground and self.streets is None else None,
+        )
         for what, table, path in (
             ("buildings", loaded.buildings, self.buildings),
             ("streets", loaded.streets, self.streets),
         ):
-            if path is not None and table is None:
+            if path is not None and (table is None or table.empty):
                 notes.append(f"there are no {what} in what was loaded, so {path} is not written")
             elif path is not None:
                 street_objects.save_surroundings(table, path)
@@ -210,9 +237,10 @@ class Load(LoadOptions):
         str | None,
         Option(
             "Keep only what is in this box in degrees, in the polygons of a file, or with 'box' "
-            "in the area that OpenStreetMap files state.",
+            "in the box that OpenStreetMap files state; with 'none' keep all.",
             title="Area to keep",
-            metavar="WEST,SOUTH,EAST,NORTH|FILE|box",
+            metavar="WEST,SOUTH,EAST,NORTH|FILE|box|none",
+            default="box where a file states one",
             reads=True,
         ),
     ] = None
@@ -225,7 +253,7 @@ class Load(LoadOptions):
                 catalog=self.catalog or (),
                 layers=self.layer or (),
                 selection=self.selection,
-                surroundings=bool(self.buildings or self.streets),
+                surroundings=self.with_ground,
                 clip=self.clip,
                 crs=self.crs,
                 metric_crs=self.metric_crs,

@@ -40,7 +40,7 @@ class Synthesize:
 
     def run(self, reporter: Reporter) -> Result:
         """Write the city; return its files."""
-        from semsig_gis.objects import build_objects, save_objects, save_surroundings
+        from semsig_gis.objects import build_objects, save_ground, save_objects
         from semsig_gis.sources import (
             PARIS_LIKE,
             CitySpec,
@@ -57,11 +57,9 @@ class Synthesize:
             surroundings = synthetic_surroundings(spec)
         objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
         save_objects(objects, self.out / "objects.parquet")
-        for layer in surroundings:
-            save_surroundings(layer.table, self.out / f"{layer.spec.role}.parquet")
-        files = {"street objects": self.out / "objects.parquet"} | {
-            layer.spec.role: self.out / f"{layer.spec.role}.parquet" for layer in surroundings
-        }
+        files = {"street objects": self.out / "objects.parquet"} | save_ground(
+            self.out / "objects.parquet", **{layer.spec.role: layer.table for layer in surroundings}
+        )
         return Result(
             values=lambda: {"objects": len(objects), "files": [*map(str, files.values())]},
             summary=[f"A made-up city with {len(objects):,} street objects."],

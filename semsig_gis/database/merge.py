@@ -121,24 +121,32 @@ def merge_databases(
                 "database again."
             )
     store, shared = _merged_store(*stores)
+    # The buildings and streets that the cells depend on, not those that are only drawn.
+    used, *used_parts = (
+        replace(
+            part,
+            footprints=None if template.occlusion is None else part.footprints,
+            streets=part.streets if needs_streets else None,
+        )
+        for part in (store, *stores)
+    )
     facts: dict[str, Any] = {
         "licenses": (
             *map(str, store.objects.licenses),
-            *licenses_of(store.footprints, store.streets if needs_streets else None),
+            *licenses_of(used.footprints, used.streets),
         ),
         "notes": store.objects.notes,
         "version": __version__,
     }
     # Cells outside of this box depend on only one of the databases.
     widest = 0.0
-    if store.streets is not None and needs_streets:
-        widths = store.streets.get(HALF_WIDTH, np.empty(0))
+    if used.streets is not None:
+        widths = used.streets.get(HALF_WIDTH, np.empty(0))
         widest = float(np.nanmax(np.append(widths, template.viewpoints.width)))
-    boxes = [_bounds(part) for part in stores]
     around = max(template.reach, widest) + MARGIN_M
-    low = np.maximum(*(box[:2] for box in boxes)) - around
-    high = np.minimum(*(box[2:] for box in boxes)) + around
-    recomputed = _build_box(template, store, low, high, progress=progress)
+    low = np.maximum(*(box[:2] for box in map(_bounds, used_parts))) - around
+    high = np.minimum(*(box[2:] for box in map(_bounds, used_parts))) + around
+    recomputed = _build_box(template, used, low, high, progress=progress)
     parts = [part.select(~_within(part.xy, low, high)) for part in databases]
     merged = replace(join_databases([*parts, recomputed]), **facts)
     save_with_store(merged, store, out)

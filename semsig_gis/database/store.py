@@ -38,7 +38,7 @@ from semsig_gis.database.file import (
     require_file,
     save_database,
 )
-from semsig_gis.database.occlusion import Footprints, buildings_near
+from semsig_gis.database.occlusion import TOLERANCE_M, Footprints, buildings_near
 from semsig_gis.database.place_names import NEAR_M, PlaceNames
 from semsig_gis.database.viewpoints import reproject, select_elements
 from semsig_gis.objects import licenses_of, open_objects, save_objects
@@ -83,12 +83,15 @@ NEXT = ".next"  # suffix of a new store until its database is in place
 class ObjectStore(Displayed):
     """The data that a signature database was built from.
 
+    Its buildings and streets are drawn and name places. They change what is seen only if the
+    database was built with them: `SignatureDatabase.occlusion` and `viewpoints` say so.
+
     Parameters
     ----------
     objects : StreetObjects
         The objects.
     footprints, streets : GeoDataFrame, optional
-        Buildings and centre lines in the CRS of the objects, if it was built with them.
+        Buildings and centre lines in the CRS of the objects, if there are any.
 
     Examples
     --------
@@ -120,7 +123,8 @@ class ObjectStore(Displayed):
     ) -> ObjectStore:
         """Make the store of a database from the arguments of `build_database`.
 
-        CrsError if `footprints` or `streets` have no CRS.
+        It may have buildings or streets that the database was built without. CrsError if
+        `footprints` or `streets` have no CRS.
         """
         houses = select_elements(footprints, "buildings")
         lines = select_elements(streets, "streets")
@@ -147,13 +151,19 @@ class ObjectStore(Displayed):
         return self._names.of(x, y)
 
     def buildings_around(
-        self, places: NDArray[np.float64], *, distance: float
+        self,
+        places: NDArray[np.float64],
+        *,
+        distance: float,
+        occlusion: float | None = TOLERANCE_M,
     ) -> Footprints | None:
-        """Return the buildings within `distance` metres of some places, None without any.
+        """Return the buildings that hide objects within `distance` metres of some places.
 
-        Buildings joined to them are included. Places, shape (p, 2), are in metres.
+        Buildings joined to them are included. Places, shape (p, 2), are in metres. None if there
+        are none, or `occlusion`, which is that of the database, is None: then the buildings are
+        only for maps and names.
         """
-        if self.footprints is None:
+        if self.footprints is None or occlusion is None:
             return None
         polygons = self.footprints.geometry.to_numpy()
         near = buildings_near(polygons, places, distance=distance)

@@ -365,14 +365,14 @@ def plan_tiles(
 ) -> TilePlan:
     """Check the inputs of a run, begin or resume it, and return the plan of its tiles.
 
-    Streets are ignored unless the viewpoints are ``"streets"``. `digests` replace the computed
+    Streets are only copied unless the viewpoints are ``"streets"``. `digests` replace the computed
     digests of inputs that are copies. `tell` is called with messages about the files of buildings
     and streets.
     """
     inputs: dict[Input, str | Path | None] = {
         "objects": objects,
         "buildings": buildings,
-        "streets": streets if viewpoints.mode == "streets" else None,
+        "streets": streets,
     }
     paths = {name: Path(path).absolute() for name, path in inputs.items() if path is not None}
     empty = open_objects(paths["objects"], box=EMPTY_BOX)
@@ -394,7 +394,7 @@ def plan_tiles(
             name: copy_with_bounds(name, path, empty.crs, folder, tell)
             for name, path in paths.items()
         }
-        lines = files.get("streets")
+        lines = files.get("streets") if viewpoints.mode == "streets" else None
         return TilePlan(
             folder=folder,
             objects=files["objects"],

@@ -62,6 +62,7 @@ from semsig_gis.storage import read_json, write_json
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    import geopandas as gpd
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
@@ -263,7 +264,7 @@ def update_database(
     new = replace(
         database,
         taxonomy=merged.taxonomy,
-        licenses=(*map(str, merged.licenses), *licenses_of(store.footprints, streets)),
+        licenses=(*map(str, merged.licenses), *licenses_of(_hiding(database, store), streets)),
         version=__version__,
         notes=merged.notes,
     )
@@ -474,6 +475,11 @@ def _find_change(
     )
 
 
+def _hiding(database: SignatureDatabase, store: ObjectStore) -> gpd.GeoDataFrame | None:
+    """Return the buildings that hide objects of a database."""
+    return None if database.occlusion is None else store.footprints
+
+
 def _recompute(
     database: SignatureDatabase,
     store: ObjectStore,
@@ -487,7 +493,7 @@ def _recompute(
     near = np.unique(store.index.pairs_within(change.places, radius=around)[1])
     if len(near) == 0:
         return database.select(slice(0))
-    footprints = store.footprints
+    footprints = _hiding(database, store)
     if footprints is not None:
         polygons = footprints.geometry.to_numpy()
         footprints = footprints.iloc[buildings_near(polygons, change.places, distance=around)]

@@ -10,8 +10,10 @@ from semsig_gis.objects.layers import assemble, choose_layers, read_files
 from semsig_gis.objects.skipped_layers import layers_in_same_extracts, read_small_layers
 from semsig_gis.sources import (
     BOX,
+    NO_CLIP,
     Catalog,
     clip_layers,
+    clip_to_extents,
     combine_catalogs,
     detect_catalogs,
     load_catalog,
@@ -62,8 +64,9 @@ def load(
     surroundings : bool, default True
         Whether buildings and streets are read as well, from files that have them.
     clip : str, optional
-        Area to keep: ``west,south,east,north`` in degrees, the path of a file with polygons, or
-        ``"box"`` for the area that OpenStreetMap files state.
+        Area to keep: ``west,south,east,north`` in degrees, the path of a file with polygons,
+        ``"box"`` for the box that OpenStreetMap files state, or ``"none"`` for everything. By
+        default, each of these files is cut to its box if it states one.
     crs : int, str or pyproj.CRS, optional
         CRS of files that do not state one, such as 2154, its EPSG code.
     metric_crs : int, str or pyproj.CRS, optional
@@ -125,7 +128,7 @@ def load(
         paths,
         filters=filters,
         crs=crs,
-        area=None if clip in {None, BOX} else parse_area(clip),
+        area=None if clip in {None, BOX, NO_CLIP} else parse_area(clip),
         progress=progress,
     )
     raw += read_small_layers(merged, [*specs, *others], paths, filters=filters, crs=crs)
@@ -133,9 +136,12 @@ def load(
         f"layer {spec.name!r} has no file here ({', '.join(spec.files) or 'it names none'}); "
         "it is left out"
         for spec in absent
-        if spec not in others
+        if spec not in others and spec.role == "objects"
     ]
-    if clip is not None:
+    if clip is None:
+        raw, clipped = clip_to_extents(raw)
+        notes += [clipped] if clipped else []
+    elif clip != NO_CLIP:
         raw = clip_layers(raw, clip)
         notes.append(AT_THE_EDGE)
     return assemble(

@@ -135,6 +135,39 @@ def read_surroundings(
     return _read(path, role, crs, box, tell)
 
 
+def ground_file(objects: str | Path, role: Literal["buildings", "streets"]) -> Path:
+    """Return the file of buildings or streets that belongs to a file of street objects.
+
+    That of ``town.parquet`` is ``town.buildings.parquet``.
+    """
+    return Path(objects).with_suffix(f".{role}.parquet")
+
+
+def save_ground(
+    objects: str | Path,
+    *,
+    buildings: gpd.GeoDataFrame | None = None,
+    streets: gpd.GeoDataFrame | None = None,
+) -> dict[str, Path]:
+    """Save buildings and streets next to a file of street objects; return their files by role.
+
+    Files of earlier objects of that name are removed (see `ground_file`).
+    """
+    roles: dict[Literal["buildings", "streets"], gpd.GeoDataFrame | None] = {
+        "buildings": buildings,
+        "streets": streets,
+    }
+    written: dict[str, Path] = {}
+    for role, table in roles.items():
+        path = ground_file(objects, role)
+        if table is None or table.empty:
+            path.unlink(missing_ok=True)
+        else:
+            save_surroundings(table, path)
+            written[role] = path
+    return written
+
+
 def select_role(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) -> gpd.GeoDataFrame:
     """Return the buildings or streets in a table of OpenStreetMap elements; other tables unchanged.
 

@@ -557,7 +557,9 @@ class Workbench:
             place,
             index=self.store.index,
             radius=self.database.spec.radius,
-            footprints=self.store.buildings_around(place, distance=self.database.reach),
+            footprints=self.store.buildings_around(
+                place, distance=self.database.reach, occlusion=self.database.occlusion
+            ),
         )
         return Sight(codes=views.codes, bearings=views.bearings, distances=views.distances)
 

@@ -18,8 +18,10 @@ from .class_keywords import keywords as keywords
 from .class_keywords import words_of as words_of
 from .clip import BOX as BOX
 from .clip import NUMBERS as NUMBERS
+from .clip import NO_CLIP as NO_CLIP
 from .clip import clip_layer as clip_layer
 from .clip import clip_layers as clip_layers
+from .clip import clip_to_extents as clip_to_extents
 from .clip import names_place as names_place
 from .clip import note_outside as note_outside
 from .clip import parse_area as parse_area

@@ -31,6 +31,7 @@ NUMBERS = re.compile(r"[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*")
 T = TypeVar("T", shapely.Polygon | shapely.MultiPolygon, "NDArray[np.object_]")
 # The text by which a user requests the bounding box that a file states.
 BOX = "box"
+NO_CLIP = "none"
 METRES_A_DEGREE = 111_195.0  # of latitude
 POLYGONAL = {"Polygon", "MultiPolygon"}
 
@@ -121,6 +122,23 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
     return tuple(clip_layer(layer, area) for layer in layers)
 
 
+def clip_to_extents(layers: Sequence[RawLayer]) -> tuple[tuple[RawLayer, ...], str]:
+    """Remove the rows outside the bounding box that the source of each layer states.
+
+    Layers of sources without one are returned unchanged. The text says how many rows were removed;
+    it is empty if none was.
+    """
+    clipped = tuple(
+        layer if layer.extent is None else clip_layer(layer, layer.extent) for layer in layers
+    )
+    outside = sum(len(layer) for layer in layers) - sum(len(layer) for layer in clipped)
+    note = (
+        f"clipped to the box that OpenStreetMap files state: {outside:,} row"
+        f"{'' if outside == 1 else 's'} beyond it left out (--clip {NO_CLIP} keeps them)"
+    )
+    return clipped, note if outside else ""
+
+
 def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
     """Remove the rows of a layer that are outside an area.
 
@@ -142,7 +160,7 @@ def note_outside(layer: RawLayer) -> RawLayer:
     metres = shapely.distance(places, _narrowed(layer.extent.polygon, layer.extent))
     note = (
         f"{outside.sum():,} of {len(outside):,} rows are outside the box that the file says it "
-        f"covers, by up to {metres.max() * METRES_A_DEGREE:,.0f} m; --clip {BOX} leaves them out"
+        f"covers, by up to {metres.max() * METRES_A_DEGREE:,.0f} m"
     )
     return dataclasses.replace(layer, notes=(*layer.notes, note))
 

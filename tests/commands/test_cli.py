@@ -235,13 +235,20 @@ def test_openstreetmap_with_its_surroundings(city: Path, run: Run, run_ok: RunOk
         node(1, 7.42, 43.73, {"amenity": "bench"}),
         node(2, 7.46, 43.73, {"amenity": "bench"}),
     )
-    for clip, outside, inside in (("", 0, 2), ("--clip box", 1, 1), ("--clip 7.45,43,8,44", 1, 1)):
+    for clip, outside, inside in (
+        ("", 1, 1),
+        ("--clip none", 0, 2),
+        ("--clip box", 1, 1),
+        ("--clip 7.45,43,8,44", 1, 1),
+    ):
         report = json.loads(run_ok(f"{load} {clip}"))
         (benches,) = (layer for layer in report["sources"] if layer["name"] == "benches")
         assert (benches["outside"], benches["kept"]) == (outside, inside)
-        assert any("--area" in note for note in report["notes"]) == bool(clip)
+        at_the_edge = any("--area" in note for note in report["notes"])
+        assert at_the_edge == (clip not in {"", "--clip none"})
+        assert any("--clip none" in note for note in report["notes"]) == (clip == "")
         noted = any("1 of" in note and "by up to 80" in note for note in benches["notes"])
-        assert noted == (clip != "--clip box")
+        assert noted == (clip not in {"", "--clip box"})
     code, _, err = run(LOAD, "--buildings", "none.parquet")
     assert code == 0
     assert "no buildings in what was loaded, so none.parquet is not written" in err

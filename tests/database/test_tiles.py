@@ -221,8 +221,17 @@ def test_files_with_bounds_are_copied_unchanged(objects_file: Path, tmp_path: Pa
     assert tile_plan.folder == tmp_path / "city.partial"
     assert (tile_plan.side, tile_plan.reach, tile_plan.street_reach) == (5, 30.0, 21.0)
     assert tile_plan.box((15, -2), 3.0) == (747.0, -103.0, 803.0, -47.0)
-    # Streets that no viewpoint needs are ignored.
-    assert plan(objects_file, streets="nowhere.parquet").streets is None
+
+
+def test_streets_that_no_viewpoint_needs_are_kept_for_maps(
+    objects_file: Path, tmp_path: Path
+) -> None:
+    streets = tmp_path / "streets.parquet"
+    save_surroundings(STREETS, streets)
+    tile_plan = plan(objects_file, streets=streets)
+    assert tile_plan.streets is None
+    kept = tmp_path / "city.partial" / "_inputs" / "streets.parquet"
+    assert kept.read_bytes() == streets.read_bytes()
 
 
 def test_other_files_are_copied_once(objects_file: Path, town: World, tmp_path: Path) -> None:

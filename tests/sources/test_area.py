@@ -23,6 +23,7 @@ from semsig_gis.sources import (
     RowCounts,
     clip_layer,
     clip_layers,
+    clip_to_extents,
     join_areas,
     names_place,
     note_outside,
@@ -207,7 +208,7 @@ def test_rows_outside_the_box_of_their_file_are_noted_and_clipped() -> None:
     (note,) = note_outside(layer).notes
     assert note.startswith("2 of 4 rows are outside the box that the file says it covers")
     metres = Geod(ellps="WGS84").inv(25.1, 60.0, 25.12, 60.0)[2]
-    distance = float(note.partition("up to ")[2].partition(" m;")[0].replace(",", ""))
+    distance = float(note.partition("up to ")[2].removesuffix(" m").replace(",", ""))
     assert distance == pytest.approx(metres, rel=0.005)
     # A house that crosses the edge is inside.
     houses = benches(*places, extent="24.9,59.9,25.1,60.1", role="buildings")
@@ -216,6 +217,12 @@ def test_rows_outside_the_box_of_their_file_are_noted_and_clipped() -> None:
     for count, clipped in zip((2, 3, 0), clip_layers([layer, houses, other], "box"), strict=True):
         assert (clipped.counts.kept, clipped.counts.outside) == (count, clipped.counts.read - count)
         assert note_outside(clipped).notes == ()
+    unstated = benches((25.12, 60.0), (25.2, 60.0))
+    layers, note = clip_to_extents([layer, houses, unstated])
+    assert [clipped.counts.kept for clipped in layers] == [2, 3, 2]
+    assert "3 rows" in note
+    assert "--clip none" in note
+    assert clip_to_extents([unstated])[1] == ""
     other = benches((25.12, 60.0), extent="25.11,59.9,25.2,60.1")
     both = clip_layers([layer, other], "box")  # of both extracts
     assert [clipped.counts.kept for clipped in both] == [3, 1]

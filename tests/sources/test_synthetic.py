@@ -146,7 +146,8 @@ def test_layers_are_the_classes_of_the_paper() -> None:
     assert (streets.spec.role, streets.spec.geometry) == ("streets", "line")
     assert set(buildings.table.geometry.geom_type) == {"Polygon"}
     assert set(streets.table.geometry.geom_type) == {"LineString"}
-    assert list(streets.table.columns) == ["class_name", "source_id", "geometry", "half_width"]
+    columns = ["class_name", "source_id", "geometry", "half_width", "name"]
+    assert list(streets.table.columns) == columns
     assert streets.table["half_width"].dtype == np.float64
 
 

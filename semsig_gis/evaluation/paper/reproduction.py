@@ -385,7 +385,7 @@ def _variants(
                 grid=database.grid,
                 spec=replace(database.spec, radius=radius),
                 viewpoints=database.viewpoints,
-                footprints=city.store.footprints,
+                footprints=None if database.occlusion is None else city.store.footprints,
                 streets=city.store.streets,
                 progress=show(f"building for a visibility range of {radius:g} m"),
             )

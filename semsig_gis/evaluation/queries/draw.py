@@ -226,7 +226,7 @@ def _sights(
         places,
         index=store.index,
         radius=city.spec.radius,
-        footprints=store.buildings_around(places, distance=city.reach),
+        footprints=store.buildings_around(places, distance=city.reach, occlusion=city.occlusion),
     )
     parts = (slice(low, high) for low, high in pairwise(views.offsets.tolist()))
     return places, (
@@ -252,7 +252,7 @@ def _places(
             ]
         )
         candidates = city.xy[block][:, None] + step * offsets
-        buildings = store.buildings_around(city.xy[block], distance=step)
+        buildings = store.buildings_around(city.xy[block], distance=step, occlusion=city.occlusion)
         free = np.ones(candidates.shape[:2], np.bool_)
         if buildings is not None:
             free = ~buildings.cover(candidates.reshape(-1, 2)).reshape(free.shape)

@@ -199,7 +199,9 @@ class _Search:
             for (x, y), turn in zip(points.tolist(), turns.tolist(), strict=True)
         ]
         points = np.concatenate([points for points, _ in places])
-        footprints = self.store.buildings_around(points, distance=self.database.reach)
+        footprints = self.store.buildings_around(
+            points, distance=self.database.reach, occlusion=self.database.occlusion
+        )
         radius = self.database.spec.radius
         objects = self.store.objects
         learnt = learn_noise(samples, objects, radius=radius, footprints=footprints).noise

@@ -619,6 +619,7 @@ class LikelihoodLocator:
             headings=[None if turns is None else turns[cells] for turns in scores.headings],
             # The chances of the cells without the likelihood of this query.
             log_prior=np.log(chances[cells]) - scores.loglik[cells],
+            occlusion=database.occlusion,
         )
 
     def _explanation(
@@ -644,7 +645,9 @@ class LikelihoodLocator:
             index=self.store.index,
             radius=database.spec.radius,
             heading=headings,
-            footprints=self.store.buildings_around(np.array([[x, y]]), distance=database.reach),
+            footprints=self.store.buildings_around(
+                np.array([[x, y]]), distance=database.reach, occlusion=database.occlusion
+            ),
         )
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from semsig_gis.core import Displayed, InputError, cell_ids, percent, signed_degrees
-from semsig_gis.database import visible_objects_at
+from semsig_gis.database import TOLERANCE_M, visible_objects_at
 from semsig_gis.localization.likelihood.association import turn_logs
 from semsig_gis.localization.likelihood.index import own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
@@ -405,6 +405,7 @@ def refine(
     north_sigma: float = 0.0,
     headings: Sequence[NDArray[np.floating] | None] | None = None,
     log_prior: NDArray[np.float64] | None = None,
+    occlusion: float | None = TOLERANCE_M,
 ) -> Refinement:
     """Search the place of a query within some cells; chances are likelihood times area.
 
@@ -412,7 +413,8 @@ def refine(
     metres of the likeliest cells, likeliest first; some hundred are enough. `noise` is for a known
     place. `step` and `radius` are in metres; `north_sigma`, in degrees, is for photos without their
     own. If it is not 0, `headings` are required: by photo, the likeliest one in each cell. Those of
-    the result are of the first photo. `log_prior` is the prior of the cells.
+    the result are of the first photo. `log_prior` is the prior of the cells. If `occlusion`, that
+    of the database, is None, the buildings of the store hide nothing.
     """
     check_north(north_sigma)
     photos = View.of(query).split()
@@ -436,7 +438,7 @@ def refine(
     )
     photo_tables = [PhotoTable.of(photo, tables[0]) for photo in photos]
     size, most = float(step), DIVIDED_PARTS[0]
-    footprints = store.buildings_around(cells, distance=tables[0].reach + size)
+    footprints = store.buildings_around(cells, distance=tables[0].reach + size, occlusion=occlusion)
     parts = np.asarray(cells[:most], dtype=np.float64)
     prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[:most]
     turned = np.stack(

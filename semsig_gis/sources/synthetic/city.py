@@ -200,8 +200,8 @@ def synthetic_surroundings(spec: CitySpec | None = None) -> tuple[RawLayer, RawL
     -------
     buildings, streets : RawLayer
         Footprints (polygons) and centre lines of the city that `synthetic_city` returns for the
-        same specification, in EPSG:32631. The streets also have the column ``half_width``: metres
-        from the centre line to the houses. Their ``source_id`` is the edge in the ids of objects.
+        same specification, in EPSG:32631. The streets also have the columns ``half_width``
+        (metres from the centre line to the houses) and ``name``. Their ``source_id`` is the edge in the ids of objects.
 
     Examples
     --------
@@ -230,7 +230,12 @@ def _streets(spec: CitySpec, network: Network) -> RawLayer:
     edges = np.flatnonzero(~shapely.is_empty(lines))
     numbers = [str(number) for number in edges]
     streets = _layer(spec, "streets", _placed(spec, lines[edges]), numbers)
-    table = streets.table.assign(half_width=network.half_width[edges])
+    kinds = np.where(network.avenue[edges], "Avenue", "Street").tolist()
+    names = zip(kinds, network.street[edges].tolist(), strict=True)
+    table = streets.table.assign(
+        half_width=network.half_width[edges],
+        name=[f"{kind} {street + 1}" for kind, street in names],
+    )
     return RawLayer(spec=streets.spec, counts=streets.counts, table=table)
 
 

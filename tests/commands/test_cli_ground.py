@@ -1,0 +1,133 @@
+"""Buildings and streets from load to the name of a place, and the area that load keeps."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+from osm_xml import node, way, write_osm
+
+from semsig_gis.database import open_city, open_store
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run, RunOk
+
+LAT, LON = 43.73, 7.42
+DEGREE_M = 111_195.0
+LOAD = "load town.osm --out town.parquet"
+GROUND = ("town.buildings.parquet", "town.streets.parquet")
+QUERY = "--types L --bearings 180 --json"
+
+
+def at(number: int, east: float, north: float, tags: dict[str, str] | None = None) -> str:
+    """Return a node some metres from the middle of the town."""
+    lon = LON + east / (DEGREE_M * 0.7225)
+    return node(number, lon, LAT + north / DEGREE_M, tags)
+
+
+@pytest.fixture
+def town(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder with a town of a street, a house and a bench on each side of the house."""
+    monkeypatch.chdir(tmp_path)
+    write_osm(
+        tmp_path / "town.osm",
+        at(1, -60, 0),
+        at(2, 60, 0),
+        at(3, -15, 12),
+        at(4, 15, 12),
+        at(5, 15, 30),
+        at(6, -15, 30),
+        at(7, 0, 3, {"amenity": "bench"}),
+        at(8, 0, 38, {"amenity": "bench"}),
+        way(10, [1, 2], {"highway": "residential", "name": "Rue Longue"}),
+        way(11, [3, 4, 5, 6, 3], {"building": "yes", "name": "Town Hall"}),
+    )
+    return tmp_path
+
+
+def cells(run_ok: RunOk, options: str = "") -> tuple[int, int]:
+    run_ok(f"build town.parquet --out city.parquet {options}")
+    database = open_city("city.parquet").database
+    return len(database), len(database.codes)
+
+
+def test_load_keeps_the_ground_and_build_finds_it(town: Path, run: Run, run_ok: RunOk) -> None:
+    run_ok(LOAD)
+    assert all((town / name).is_file() for name in GROUND)
+    code, _, err = run("build town.parquet --out city.parquet")
+    assert code == 0
+    for words in (*GROUND, "hide what is behind", "outdoor", "--no-ground"):
+        assert words in err
+    city = open_city("city.parquet")
+    assert (city.database.viewpoints.mode, city.database.occlusion) == ("outdoor", 0.5)
+    assert (len(city.store.footprints), len(city.store.streets)) == (1, 1)
+    with_ground = cells(run_ok)
+    plain = cells(run_ok, "--no-ground")
+    assert with_ground[0] < plain[0]
+    store = open_store("city.parquet")
+    assert (store.footprints, store.streets) == (None, None)
+    everywhere = cells(run_ok, "--viewpoints all")
+    assert everywhere[1] < plain[1]  # the house hides
+
+
+def test_ground_of_an_earlier_load_is_not_used(town: Path, run_ok: RunOk) -> None:
+    run_ok(LOAD)
+    run_ok(f"{LOAD} --no-ground")
+    assert not any((town / name).exists() for name in GROUND)
+    run_ok(f"{LOAD} --buildings houses.parquet")
+    assert [(town / name).exists() for name in GROUND] == [False, True]
+    run_ok("build town.parquet --out city.parquet")
+    city = open_city("city.parquet")
+    assert (city.database.viewpoints.mode, city.database.occlusion) == ("all", None)
+    assert (city.store.footprints, len(city.store.streets)) == (None, 1)
+
+
+@pytest.mark.parametrize(("name", "options"), [("city.parquet", ""), ("city", "--tile 100")])
+def test_answers_name_their_place(
+    town: Path,  # noqa: ARG001
+    run_ok: RunOk,
+    name: str,
+    options: str,
+) -> None:
+    run_ok(LOAD)
+    run_ok(f"build town.parquet --out {name} {options}")
+    for method in ("likelihood", "edit+edit"):
+        place = json.loads(run_ok(f"localize {name} {QUERY} --method {method}"))["place"]
+        assert place["name"].endswith("near Town Hall")
+        assert all(link.startswith("https://") for link in place["links"].values())
+        assert f"{place['lat']:.4f}" in place["links"]["OpenStreetMap"]
+    run_ok("build town.parquet --out city.parquet --no-ground")
+    assert json.loads(run_ok(f"localize city.parquet {QUERY}"))["place"]["name"] == ""
+
+
+def test_streets_are_kept_for_every_choice_of_viewpoints(town: Path, run_ok: RunOk) -> None:
+    run_ok(f"{LOAD} --streets lanes.parquet")
+    for mode in ("all", "outdoor", "streets"):
+        run_ok(f"build town.parquet --out city.parquet --streets lanes.parquet --viewpoints {mode}")
+        assert len(open_city("city.parquet").store.streets) == 1
+    run_ok("build town.parquet --out tiles --tile 100 --streets lanes.parquet --viewpoints all")
+    assert len(open_city(town / "tiles").store.streets) == 1
+
+
+def test_update_and_merge_keep_the_ground(town: Path, run_ok: RunOk) -> None:  # noqa: ARG001
+    run_ok(LOAD)
+    for name, options in (("city.parquet", ""), ("tiles", "--tile 100")):
+        run_ok(f"build town.parquet --out {name} {options}")
+        run_ok(f"update {name} --objects town.parquet")
+        store = open_city(name).store
+        assert (len(store.footprints), len(store.streets)) == (1, 1)
+    run_ok("merge city.parquet tiles --out both.parquet")
+    store = open_city("both.parquet").store
+    assert (len(store.footprints), len(store.streets)) == (1, 1)
+    assert store.place_name(*open_city("city.parquet").database.xy[0]) != ""
+
+
+def test_made_up_cities_have_ground(town: Path, run_ok: RunOk) -> None:  # noqa: ARG001
+    run_ok("synthesize --size 250 --out made")
+    run_ok("build made/objects.parquet --out made.parquet")
+    city = open_city("made.parquet")
+    assert city.database.viewpoints.mode == "outdoor"
+    assert any(city.place_name(*xy).startswith(("on ", "at ")) for xy in city.database.xy)
