@@ -188,7 +188,7 @@ class Build:
         properties = Info(database=self.out).run(reporter)
         return replace(
             properties,
-            summary=self._summary(cells, entries),
+            summary=self._summary(cells, entries, mode),
             files={"signature database": self.out},
             notes=[self._found_note(found, mode)] if found else [],
         )
@@ -234,13 +234,13 @@ class Build:
             effect = f"; buildings hide what is behind them{outdoor}"
         return f"with the {' and '.join(found)} of {files}{effect} (--no-ground: without them)"
 
-    def _summary(self, cells: int, entries: int) -> Iterator[str]:
+    def _summary(self, cells: int, entries: int, mode: str) -> Iterator[str]:
         from semsig_gis.database import open_city
 
         size = open_city(self.out).bytes / 1e6
         where = {"all": "", "outdoor": " outside buildings", "streets": " along streets"}
         yield (
-            f"{cells:,} cells of {self.step:g} m{where[self.viewpoints]} see "
+            f"{cells:,} cells of {self.step:g} m{where[mode]} see "
             f"{entries / cells:.1f} street objects on average, up to {self.radius:g} m away, in "
             f"{size:.1f} MB."
         )

@@ -17,8 +17,8 @@ from .class_keywords import class_code as class_code
 from .class_keywords import keywords as keywords
 from .class_keywords import words_of as words_of
 from .clip import BOX as BOX
-from .clip import NUMBERS as NUMBERS
 from .clip import NO_CLIP as NO_CLIP
+from .clip import NUMBERS as NUMBERS
 from .clip import clip_layer as clip_layer
 from .clip import clip_layers as clip_layers
 from .clip import clip_to_extents as clip_to_extents

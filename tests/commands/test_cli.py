@@ -461,8 +461,8 @@ def test_buildings_streets_and_area_select_cells(city: Path, run: Run, run_ok: R
     cells, entries = {}, {}
     for name, options in {
         "all": "",
-        "buildings": "--buildings houses.gpkg",
-        "outdoor": "--buildings houses.gpkg --viewpoints outdoor",
+        "buildings": "--buildings houses.gpkg --viewpoints all",
+        "outdoor": "--buildings houses.gpkg",
         "streets": "--streets streets.geojson --viewpoints streets",
         "free": "--streets streets.geojson --viewpoints streets --buildings houses.gpkg",
         "wide": "--streets streets.geojson --viewpoints streets --street-width 40",

@@ -201,7 +201,8 @@ def synthetic_surroundings(spec: CitySpec | None = None) -> tuple[RawLayer, RawL
     buildings, streets : RawLayer
         Footprints (polygons) and centre lines of the city that `synthetic_city` returns for the
         same specification, in EPSG:32631. The streets also have the columns ``half_width``
-        (metres from the centre line to the houses) and ``name``. Their ``source_id`` is the edge in the ids of objects.
+        (metres from the centre line to the houses) and ``name``. Their ``source_id`` is the edge in
+        the ids of objects.
 
     Examples
     --------
