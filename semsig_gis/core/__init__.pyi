@@ -47,6 +47,7 @@ from .geometry import consecutive as consecutive
 from .geometry import crs_label as crs_label
 from .geometry import crs_text as crs_text
 from .geometry import degree_bounds as degree_bounds
+from .geometry import epsg_code as epsg_code
 from .geometry import grid_convergence as grid_convergence
 from .geometry import plane_distortion as plane_distortion
 from .geometry import require_metric_crs as require_metric_crs

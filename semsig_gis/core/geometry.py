@@ -154,6 +154,13 @@ def crs_label(crs: CRS) -> str:
     return crs.name if code is None else f"EPSG:{code}"
 
 
+def epsg_code(crs: CRS) -> int | None:
+    """Return the EPSG code of a CRS; None if it has none, or only that of a similar CRS."""
+    code = crs.to_epsg()
+    same = code is not None and CRS.from_epsg(code).equals(crs, ignore_axis_order=True)
+    return code if same else None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distortion:
     """Distortion of angles and lengths by a metric CRS over an extent.

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyogrio
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
-from pyproj import CRS
 
-from semsig_gis.core import GEOMETRY, InputError
+from semsig_gis.core import GEOMETRY, InputError, epsg_code
 from semsig_gis.output.layers.model import GEOMETRY_TYPES
 from semsig_gis.storage import whole_file
 
@@ -63,13 +62,11 @@ def write_features(
             errors.append(error)
             raise
 
-    # The code that PROJ finds may be of a CRS that is only similar.
-    code = layer.crs.to_epsg()
-    same = code is not None and CRS.from_epsg(code).equals(layer.crs, ignore_axis_order=True)
+    code = epsg_code(layer.crs)
     geometry = {
         "geometry_name": GEOMETRY,
         "geometry_type": GEOMETRY_TYPES.get(layer.geometry),
-        "crs": f"EPSG:{code}" if same else layer.crs.to_wkt(),
+        "crs": layer.crs.to_wkt() if code is None else f"EPSG:{code}",
     }
     try:
         pyogrio.write_arrow(

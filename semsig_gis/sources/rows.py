@@ -26,6 +26,7 @@ from semsig_gis.core import (
     CatalogError,
     CrsError,
     crs_label,
+    epsg_code,
     nearest_name,
 )
 from semsig_gis.sources.filters import Condition, as_text, matches, pattern_of
@@ -81,9 +82,8 @@ def usable_crs(text: str) -> CRS | None:
         return None  # an engineering CRS: a plane of its own
     if not geodetic.name or crs.name.lower().startswith("undefined"):
         return None  # without a named datum, a transformation is off by up to hundreds of metres
-    code = crs.to_epsg()
-    epsg = crs if code is None else CRS.from_epsg(code)
-    return epsg if epsg.equals(crs, ignore_axis_order=True) else crs
+    code = epsg_code(crs)
+    return crs if code is None else CRS.from_epsg(code)
 
 
 def choose_crs(

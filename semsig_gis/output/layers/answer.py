@@ -144,6 +144,8 @@ RANK = "coalesce(attribute('rank'), attribute('rank_low'))"
 CANDIDATE_LABEL = (
     f"with_variable('rank', {RANK}, case when @rank <= 10 or @map_scale < 5000 then @rank end)"
 )
+LEAST_CHANCE = 0.01
+"""A candidate is drawn from this chance on, and the best in any case."""
 
 
 def answer_layers(
@@ -174,6 +176,8 @@ def answer_layers(
         taxonomy=answer.taxonomy,
         reach=database.reach,
     )
+    chances = answer.candidates.get("chance")
+    drawn = len(candidates) if chances is None else max(int((chances >= LEAST_CHANCE).sum()), 1)
     layers = [
         layer(
             regions.table,
@@ -204,6 +208,7 @@ def answer_layers(
                 signature=("types", "bearings", "distances", " "),
                 tip=("chance", "distance"),
                 label=CANDIDATE_LABEL,
+                shown=f"{RANK} <= {drawn}",
             ),
             styles=(by_rank(str(answer.candidates.columns[0]), geometry="point"),),
         ),
@@ -263,7 +268,11 @@ def answer_layers(
                 geometry="line",
                 form=OBJECT_FORM,
                 display=Display(
-                    level=10, group=GROUP, name='"verdict"', tip=("chance", "object_title")
+                    level=10,
+                    group=GROUP,
+                    name='"verdict"',
+                    tip=("chance", "object_title"),
+                    shown=f'"candidate" <= {drawn}',
                 ),
                 styles=(RAY_STYLE,),
             )

@@ -50,7 +50,7 @@ y = ["Viewpoint, north", "In the coordinate system of the layer.", "m", 2]
 DISPLAY = Display(
     level=0,
     group="City",
-    name="""'cell ' || "cell_id" || ', ' || "types" """,
+    name="""'cell ' || "cell_id" """,
     signature=("types", "bearings", "distances", " "),
     tip=("type_group_size", "chance_found", "lookalike_1"),
 )
@@ -79,7 +79,7 @@ def cells_layer(
     crs = database.crs.to_json_dict()
     facts = {**database_specs(database), "crs": crs, "identifiability": None}
     style = functools.partial(by_amount, geometry=geometry, size=step)
-    styles = [style("Ambiguity", "type_group_size", AMBIGUITY)]
+    styles = [style("Ambiguity", "type_group_size", AMBIGUITY, heading="cells alike")]
     if identifiability is not None:
         facts["identifiability"] = identifiability.facts
         styles.insert(0, style("Identifiability", "chance_found", IDENTIFIABILITY))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -85,16 +86,17 @@ def hexagons_layer(
     names = [*map(h3.int_to_str, ids.tolist())]
     columns: dict[str, Any] = {"h3": names}
     columns |= area_statistics(database, of_cells, len(ids), identifiability=identifiability)
-    styles = [("Ambiguity", "type_group_size", AMBIGUITY)]
+    style = functools.partial(by_amount, geometry="polygon")
+    styles = [style("Ambiguity", "type_group_size", AMBIGUITY, heading="cells alike")]
     if identifiability is not None:
-        styles.insert(0, ("Identifiability", "chance_found", IDENTIFIABILITY))
+        styles.insert(0, style("Identifiability", "chance_found", IDENTIFIABILITY))
     if objects is not None:
         columns["objects"] = np.bincount(others.pop(0), minlength=len(ids))
     if evaluation is not None:
         (of_queries,) = others
         columns["queries"] = np.bincount(of_queries, minlength=len(ids))
         columns["found"] = group_means(of_queries, evaluation.successful, len(ids))
-        styles.insert(0, ("Queries found", "found", IDENTIFIABILITY))
+        styles.insert(0, style("Queries found", "found", IDENTIFIABILITY))
     # The corners of all hexagons are projected together.
     rings = [h3.cell_to_boundary(name) for name in names]
     latitudes, longitudes = np.concatenate([np.asarray(ring) for ring in rings]).T
@@ -111,5 +113,5 @@ def hexagons_layer(
         facts={**database_specs(database), "h3_resolution": resolution},
         form=FORM,
         display=DISPLAY,
-        styles=tuple(by_amount(*style, geometry="polygon") for style in styles),
+        styles=tuple(styles),
     )

@@ -47,6 +47,7 @@ class Display:
     signature: tuple[str, str, str, str] | None = None
     tip: tuple[str, ...] = ()
     label: str = ""  # expression of the label on the map
+    shown: str = ""  # expression: of the features that are drawn; all by default
     # The layer is hidden where the denominator of the scale is greater or smaller.
     nearer: int = 0
     farther: int = 0

@@ -143,7 +143,7 @@ class Symbol:
     """
 
     colour: str
-    opacity: float = 1.0  # of the fill or the line
+    opacity: float = 1.0  # of the fill, the line or a square; an edge of the colour has it as well
     shape: str = ""
     metres: float = 0.0
     least_mm: float = 0.0
@@ -170,8 +170,8 @@ class Style:
     name: str
     column: str
     classes: tuple[StyleClass, ...]
-    opacity: float = 1.0
     last_first: bool = False  # whether the first classes are drawn last, on top
+    tiled: bool = False  # whether areas lie side by side, so that none shines through another
 
     def class_of(self, value: object) -> StyleClass | None:
         """Return the class of a value, or None."""
@@ -183,19 +183,20 @@ class Style:
         return None
 
 
-# Cells are transparent, so that a background map stays visible.
+# Cells are transparent, so that a background map stays visible. The colours are, not the layer, so
+# that a legend shows what the map shows.
 CELLS_OPACITY = 0.7
 
 
 def by_class(taxonomy: Taxonomy, codes: Iterable[int]) -> Style:
-    """Return a style of points by class code: the shape of the class with its letter."""
+    """Return a style of points by class code: the shape of the class with its sign."""
     present = set(codes)
     return Style(
         name="Classes",
         column="class_code",
         classes=tuple(
             StyleClass(
-                label=f"{sign.symbol}  {sign.title}",
+                label=sign.title,
                 symbol=Symbol(colour=sign.colour, shape=sign.shape, sign=sign),
                 value=str(code),
             )
@@ -205,16 +206,23 @@ def by_class(taxonomy: Taxonomy, codes: Iterable[int]) -> Style:
     )
 
 
-def by_amount(name: str, column: str, scale: Scale, *, geometry: str, size: float = 0.0) -> Style:
-    """Return a style of cells by a number; points are drawn as squares of `size` metres."""
+def by_amount(
+    name: str, column: str, scale: Scale, *, geometry: str, size: float = 0.0, heading: str = ""
+) -> Style:
+    """Return a style of cells by a number; points are drawn as squares of `size` metres.
+
+    Each label starts with the heading, because a legend of QGIS has no place for one above.
+    """
     symbols = [
         # The thinnest outline covers the gaps that anti-aliasing leaves between cells.
-        Symbol(colour=colour, edge=colour, edge_mm=0.0)
+        Symbol(colour=colour, opacity=CELLS_OPACITY, edge=colour, edge_mm=0.0)
         if geometry == "polygon"
-        else Symbol(colour=colour, shape="square", metres=size)
+        else Symbol(colour=colour, opacity=CELLS_OPACITY, shape="square", metres=size)
         for colour in scale.colours
     ]
-    return Style(name=name, column=column, classes=_ranges(scale, symbols), opacity=CELLS_OPACITY)
+    labels = [f"{heading}: {label}" if heading else label for label in scale.labels]
+    classes = _ranges(replace(scale, labels=tuple(labels)), symbols)
+    return Style(name=name, column=column, classes=classes, tiled=True)
 
 
 def by_rank(column: str, *, geometry: str) -> Style:
@@ -234,16 +242,19 @@ def by_rank(column: str, *, geometry: str) -> Style:
 
 def by_outcome(*, geometry: str) -> Style:
     """Return a style of queries by outcome; a line ends in a mark at the best place."""
-    return _by_mark("Outcome", OUTCOMES, geometry)
+    return _by_mark("Outcome", "query", OUTCOMES, geometry)
 
 
 def by_answer(*, geometry: str) -> Style:
     """Return a style of the best place or its ellipse, by whether it is the answer or withheld."""
-    return _by_mark("Answer", ANSWERS, geometry)
+    return _by_mark("Answer", "answer", ANSWERS, geometry)
 
 
-def _by_mark(name: str, marks: Mapping[str, Mark], geometry: str) -> Style:
-    """Return a style by the column with the name of the style, in lower case."""
+def _by_mark(name: str, what: str, marks: Mapping[str, Mark], geometry: str) -> Style:
+    """Return a style by the column with the name of the style, in lower case.
+
+    A label is `what` with the value, as in "answer withheld".
+    """
     classes = []
     for value, mark in marks.items():
         symbol = Symbol(colour=mark.colour, shape=mark.shape, metres=12.0, least_mm=1.8)
@@ -253,7 +264,7 @@ def _by_mark(name: str, marks: Mapping[str, Mark], geometry: str) -> Style:
             symbol = replace(end, opacity=0.59)
         if geometry == "polygon":
             symbol = Symbol(colour=mark.colour, opacity=0.0, edge=mark.colour, edge_mm=0.6)
-        classes.append(StyleClass(label=value, symbol=symbol, value=value))
+        classes.append(StyleClass(label=f"{what} {value}", symbol=symbol, value=value))
     return Style(name=name, column=name.lower(), classes=tuple(classes))
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import lazy_loader
 
 from semsig_gis import __version__
-from semsig_gis.core import class_signs, one_line
+from semsig_gis.core import class_signs, epsg_code, one_line
 from semsig_gis.output.layers.columns import shown_lines
 from semsig_gis.output.qgis.qml import SYMBOLS, renderer
 
@@ -79,7 +79,7 @@ class ShownLayer:
 
     def renderer(self, style: Style) -> str:
         """Return the renderer of a style."""
-        return renderer(style, self.layer.geometry)
+        return renderer(style, self.layer.geometry, self.layer.display.shown)
 
     def is_drawn(self, scale: float) -> bool:
         """Return whether the layer is visible when the project opens at a scale of 1 to `scale`."""
@@ -143,7 +143,7 @@ def project_archive(layers: Sequence[Layer], shown: Sequence[ShownLayer], title:
             title=shown_lines([title])[0],
             subtitle=shown_lines([spatial[0].description], CREDIT_LETTERS)[0],
             crs=spatial[0].crs,
-            code=spatial[0].crs.to_epsg(),
+            code=epsg_code(spatial[0].crs),
             bounds=bounds,
             page=page,
             layers=shown,

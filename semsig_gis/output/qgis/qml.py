@@ -39,15 +39,19 @@ Options = Mapping[str, object]
 SymbolLayer = tuple[str, Options] | tuple[str, Options, "SymbolLayer"]
 
 
-def renderer(style: Style, geometry: str) -> str:
-    """Return the renderer element of QML that draws features by the column of a style."""
+def renderer(style: Style, geometry: str, shown: str = "") -> str:
+    """Return the renderer element of QML that draws features by the column of a style.
+
+    `shown` is an expression: features for which it is false are not drawn.
+    """
     ranges = not any(item.value for item in style.classes)
     kind, parent, child = (
         ("graduatedSymbol", "ranges", "range")
         if ranges
         else ("categorizedSymbol", "categories", "category")
     )
-    root = ET.Element("renderer-v2", type=kind, attr=style.column)
+    column = f'if({shown}, "{style.column}", NULL)' if shown else style.column
+    root = ET.Element("renderer-v2", type=kind, attr=column)
     if ranges:
         root.set("graduatedMethod", "GraduatedColor")
     if style.last_first:  # draw the smallest number last, on top
@@ -71,7 +75,8 @@ def _layers(symbol: Symbol, geometry: str) -> tuple[SymbolLayer, ...]:
     colour, opacity = symbol.colour, symbol.opacity
     if geometry == "polygon":
         fill = {"color": _rgba(colour, opacity), "style": "solid"}
-        edge = {"outline_color": _rgba(symbol.edge), "outline_style": "solid"}
+        thin = opacity if symbol.edge_mm == 0.0 else 1.0
+        edge = {"outline_color": _rgba(symbol.edge, thin), "outline_style": "solid"}
         return (("SimpleFill", {**fill, **edge, "outline_width": f"{symbol.edge_mm:g}"}),)
     if geometry == "line":
         line = {"line_color": _rgba(colour, opacity), "line_width": 0.26, "line_style": "solid"}
@@ -85,7 +90,7 @@ def _layers(symbol: Symbol, geometry: str) -> tuple[SymbolLayer, ...]:
 
 
 def _marker(symbol: Symbol) -> SymbolLayer:
-    marker = {"name": MARKERS[symbol.shape], "color": _rgba(symbol.colour)}
+    marker = {"name": MARKERS[symbol.shape], "color": _rgba(symbol.colour, symbol.opacity)}
     if not symbol.edge:
         square = {"outline_style": "no", "size": symbol.metres, "size_unit": "MapUnit"}
         return "SimpleMarker", {**marker, **square}
