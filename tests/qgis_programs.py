@@ -118,6 +118,11 @@ def about(layer: Any) -> dict[str, Any]:  # noqa: ANN401
     labels = QgsExpression(label)
     return {
         "features": layer.featureCount(),
+        "shown": shown(layer),
+        "actions": [
+            (action.name(), QgsExpression.replaceExpressionText(action.command(), context))
+            for action in layer.actions().actions()
+        ],
         "aliases": {
             field.name(): layer.attributeAlias(n) for n, field in enumerate(layer.fields())
         },
@@ -129,6 +134,22 @@ def about(layer: Any) -> dict[str, Any]:  # noqa: ANN401
         "tip": QgsExpression.replaceExpressionText(layer.mapTipTemplate(), context),
         "seen": [scale for scale in SCALES if layer.isInScaleRange(scale)],
     }
+
+
+def shown(layer: Any) -> int:  # noqa: ANN401
+    """Return the number of features that are drawn."""
+    from qgis.core import QgsRenderContext
+
+    if layer.renderer() is None:
+        return 0
+    context, renderer = QgsRenderContext(), layer.renderer().clone()
+    renderer.startRender(context, layer.fields())
+    drawn = 0
+    for feature in layer.getFeatures():
+        context.expressionContext().setFeature(feature)
+        drawn += renderer.willRenderFeature(feature, context)
+    renderer.stopRender(context)
+    return drawn
 
 
 def main(program: str, *arguments: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
@@ -13,6 +14,7 @@ import shapely
 
 from semsig_gis.core import GEOMETRY, one_line
 from semsig_gis.output.features import geojson_options, write_errors
+from semsig_gis.output.layers.columns import LINKS
 from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
@@ -57,8 +59,8 @@ def write_answer_geojson(layers: Sequence[Layer], path: str | Path) -> None:
 def write_answer_kml(layers: Sequence[Layer], path: str | Path) -> None:
     """Write the layers of an answer as one KML 2.2, atomically.
 
-    Each layer is a folder, in the colours of the maps. The description holds the licences.
-    Addresses are plain text, so nothing is requested.
+    Each layer is a folder, in the colours of the maps. The description holds the licences. The
+    description of a place has links to public maps; nothing is requested before a click.
     """
     root = ET.Element("kml", xmlns=KML)
     document = ET.SubElement(root, "Document")
@@ -118,6 +120,17 @@ def _add_place(
     style = layer.styles[0]
     if (item := style.class_of(row[style.column])) is not None:
         _add_text(place, "styleUrl", f"#c{item.symbol.colour[1:]}")
+    lines = [
+        f"{escape(column.title)}: {escape(one_line(text))}"
+        for column in layer.columns
+        if column.name in layer.display.tip and (text := column.text(row[column.name]))
+    ]
+    links = [
+        f'<a href="{escape(row[column.name])}">{escape(column.title)}</a>'
+        for column in layer.columns
+        if column.tab == LINKS
+    ]
+    _add_text(place, "description", "<br>".join([*lines, " · ".join(links)]).removesuffix("<br>"))
     extended = ET.SubElement(place, "ExtendedData")
     data = ET.SubElement(extended, "SchemaData", schemaUrl=f"#{layer.name}")
     for column, value in row.items():

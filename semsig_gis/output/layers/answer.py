@@ -34,8 +34,8 @@ fit = ["Fit", "Share of simulated views from the place that fit it worse, from 0
 within_m = ["Right within", "How near a right place is.", "m", 0]
 x = ["East", "In the coordinate system of the layer.", "m", 2]
 y = ["North", "In the coordinate system of the layer.", "m", 2]
-lon = ["Longitude", "WGS 84.", "°", 7]
 lat = ["Latitude", "WGS 84.", "°", 7]
+lon = ["Longitude", "WGS 84.", "°", 7]
 sigma = ["Standard deviation", "Of the place in either direction, if it is right.", "m", 1]
 longer_m = ["Ellipse, longer", "Half axis of the ellipse of 90 %, if the place is right.", "m", 1]
 shorter_m = ["Ellipse, shorter", "The other half axis.", "m", 1]
@@ -206,7 +206,7 @@ def answer_layers(
                 group=GROUP,
                 name=f"'candidate ' || {RANK}",
                 signature=("types", "bearings", "distances", " "),
-                tip=("chance", "distance"),
+                tip=("address", "chance", "distance"),
                 label=CANDIDATE_LABEL,
                 shown=f"{RANK} <= {drawn}",
             ),
@@ -220,7 +220,7 @@ def answer_layers(
 
     def place_layer(shapes: Any, *, name: str, level: int, **about: Any) -> Layer:  # noqa: ANN401 - as `layer` takes
         names = f"""'{name}, answer ' || "answer" """
-        tip = ("chance", "elsewhere", "sigma")
+        tip = ("address", "chance", "elsewhere", "sigma")
         return layer(
             gpd.GeoDataFrame(table, geometry=shapes, crs=answer.crs),
             name=name,

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
 LABEL_LETTERS = 60
+LINKS = "Links"
+"""Tab of the columns of addresses."""
 
 
 @dataclass(frozen=True)

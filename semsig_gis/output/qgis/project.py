@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import io
 import math
+import uuid
 import zipfile
 from dataclasses import dataclass, replace
 from html import escape
@@ -17,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 import lazy_loader
 
 from semsig_gis import __version__
-from semsig_gis.core import class_signs, epsg_code, one_line
-from semsig_gis.output.layers.columns import shown_lines
+from semsig_gis.core import PICTOGRAMS, class_signs, epsg_code, one_line
+from semsig_gis.output.layers.columns import LINKS, shown_lines
 from semsig_gis.output.qgis.qml import SYMBOLS, renderer
 
 if TYPE_CHECKING:
@@ -98,6 +99,21 @@ class ShownLayer:
             replace(sign, title=escape(title, quote=False).translate(escapes))
             for sign, title in zip(signs, titles, strict=True)
         ]
+
+    @property
+    def pictograms(self) -> dict[str, str]:
+        """Pictograms of the classes by their symbols, of those that have one."""
+        classes = () if self.layer.taxonomy is None else self.layer.taxonomy.classes
+        return {item.symbol: PICTOGRAMS[item.name] for item in classes if item.name in PICTOGRAMS}
+
+    @property
+    def links(self) -> list[Column]:
+        """The columns of addresses."""
+        return [column for column in self.layer.columns if column.tab == LINKS]
+
+    def action(self, column: Column) -> str:
+        """Return the id of the action that opens the address of a column."""
+        return f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'{self.id}/{column.name}')}}}"
 
     @property
     def tip(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
@@ -27,8 +28,9 @@ CLASS_MARKERS = {
 MARKERS = {"x": "cross2", **{shape: marker for shape, (marker, *_) in CLASS_MARKERS.items()}}
 # Limits of a sign on the screen: visible at the scale of a city, smaller than a street.
 SMALLEST_MM, LARGEST_MM = 0.9, 6.0
-# Diameter of a circle, and the height of letters in diameters.
-CIRCLE_METRES, LETTER = 7.0, 0.6
+# Diameter of a circle, and the height of letters and pictograms in diameters.
+CIRCLE_METRES, LETTER, PICTOGRAM = 7.0, 0.6, 0.64
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16"><path d="{}" fill="{}"/></svg>'
 
 # QGIS's symbol type of each geometry, in the order of QGIS's geometry numbers.
 SYMBOLS = {"point": "marker", "line": "line", "polygon": "fill"}
@@ -85,7 +87,7 @@ def _layers(symbol: Symbol, geometry: str) -> tuple[SymbolLayer, ...]:
         end = {"placement": "lastvertex", "rotate": 0}
         return ("SimpleLine", line), ("MarkerLine", end, _marker(symbol))
     if symbol.sign is not None:
-        return _class_layers(symbol.sign)
+        return _class_layers(symbol.sign, symbol.pictogram)
     return (_marker(symbol),)
 
 
@@ -99,8 +101,8 @@ def _marker(symbol: Symbol) -> SymbolLayer:
     return "SimpleMarker", {**marker, **edge, **size}
 
 
-def _class_layers(sign: ClassSign) -> tuple[SymbolLayer, SymbolLayer]:
-    """Return the symbol layers of a class: its shape and its letter."""
+def _class_layers(sign: ClassSign, pictogram: str) -> tuple[SymbolLayer, SymbolLayer]:
+    """Return the symbol layers of a class: its shape and its pictogram, or else its letter."""
     marker, angle, size, outline = CLASS_MARKERS[sign.shape]
     edge = _of_circle("outline_width", outline) if outline else {"outline_width": 0.1}
     shape = {
@@ -112,22 +114,32 @@ def _class_layers(sign: ClassSign) -> tuple[SymbolLayer, SymbolLayer]:
         **edge,
         **_of_circle("size", size),
     }
-    # The anchor moves the letter up by half its size and the offset moves it down again, because
-    # QGIS does not limit negative lengths. The offset is a tenth smaller, because QGIS centres the
-    # ascent, which is higher than capital letters.
-    down = sign.drop / 2 + (0.5 - 0.1) * LETTER
+    # The anchor moves the drawing up by half its size and the offset moves it down again, because
+    # QGIS does not limit negative lengths.
+    if pictogram:
+        drawing = base64.b64encode(SVG.format(pictogram, sign.ink).encode()).decode()
+        picture = {"name": f"base64:{drawing}", **_placed(PICTOGRAM, sign.drop / 2 + PICTOGRAM / 2)}
+        return ("SimpleMarker", shape), ("SvgMarker", picture)
     letter = {
         "font": "DejaVu Sans",
         "font_style": "Bold",
         "chr": sign.symbol,
         "color": _rgba(sign.ink),
+        # A tenth smaller, because QGIS centres the ascent, which is higher than capital letters.
+        **_placed(LETTER, sign.drop / 2 + (0.5 - 0.1) * LETTER),
+    }
+    return ("SimpleMarker", shape), ("FontMarker", letter)
+
+
+def _placed(size: float, down: float) -> Options:
+    """Return the size of what is drawn on a sign, and its offset downwards, in diameters."""
+    return {
         "horizontal_anchor_point": 1,
         "vertical_anchor_point": 2,
-        **_of_circle("size", LETTER, smallest=0.0),
+        **_of_circle("size", size, smallest=0.0),
         **_of_circle("offset", down, smallest=0.0),
         "offset": f"0,{CIRCLE_METRES * down:.3g}",
     }
-    return ("SimpleMarker", shape), ("FontMarker", letter)
 
 
 def _of_circle(length: str, share: float, *, smallest: float = SMALLEST_MM) -> Options:

@@ -1,4 +1,4 @@
 {% import "qgis/layer.xml" as parts %}
-<qgis version="3.22.0" styleCategories="LayerConfiguration|Symbology|Labeling|Fields|Forms|MapTips|AttributeTable|Rendering" {{ parts.attributes(shown) }}>
+<qgis version="3.22.0" styleCategories="LayerConfiguration|Symbology|Labeling|Fields|Forms|MapTips|Actions|AttributeTable|Rendering" {{ parts.attributes(shown) }}>
 {{ parts.body(shown, style) }}
 </qgis>

@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import zipfile
 from contextlib import closing
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
@@ -21,7 +22,7 @@ from machine import PATIENCE_S, qgis_variables
 from map_pages import HOSTILE
 from small_city import chances_of, small_city, small_evaluation, small_localization, small_location
 
-from semsig_gis.core import Taxonomy
+from semsig_gis.core import PICTOGRAMS, Taxonomy, place_links
 from semsig_gis.localization import search_regions
 from semsig_gis.objects import Licence
 from semsig_gis.output import (
@@ -87,13 +88,20 @@ def projects(qgis_python: str, tmp_path_factory: pytest.TempPathFactory) -> dict
     return contents
 
 
-def wheel_letters(tip: str) -> list[str]:
-    """Return the letters on the compass wheel of a map tip, which must be valid SVG."""
+def signs(types: str) -> list[str]:
+    """Return what stands for the classes on a wheel: a pictogram, or else the symbol."""
+    classes = {item.symbol: item.name for item in CITY.taxonomy.classes}
+    return [PICTOGRAMS.get(classes[symbol], symbol) for symbol in types]
+
+
+def wheel_signs(tip: str) -> list[str]:
+    """Return the signs on the compass wheel of a map tip, which must be valid SVG."""
     image = re.search(r'src="data:image/svg\+xml,([^"]+)"', tip)
     assert image is not None
     root = ET.fromstring(unquote(image[1]))  # noqa: S314 - our own
     assert all("NaN" not in group.get("transform", "") for group in root.iter(f"{SVG}g"))
-    return [str(text.text) for text in root.iter(f"{SVG}text")]
+    drawn = [next(iter(group)) for group in root.iter(f"{SVG}g") if "fill" in group.attrib]
+    return [sign.get("d") or str(sign.text) for sign in drawn]
 
 
 def test_city_opens_as_a_project(projects: dict[str, Any]) -> None:
@@ -117,9 +125,9 @@ def test_city_opens_as_a_project(projects: dict[str, Any]) -> None:
     assert cells["styles"] == ["Ambiguity", "Identifiability"]
     assert cells["aliases"]["gain_street_light"] == "Gain by: Street light"
     assert cells["form"]["What it is mistaken for"][:2] == ["lookalike_1", "lookalike_2"]
-    assert wheel_letters(cells["tip"]) == [*CITY.types(0)]
-    assert cells["name"] == f"cell {CITY.cell_ids[0]}, {CITY.types(0)}"
-    assert wheel_letters(queries["tip"]) == [*EVALUATION.queries["query_types"].iloc[0]]
+    assert wheel_signs(cells["tip"]) == signs(CITY.types(0))
+    assert cells["name"] == f"cell {CITY.cell_ids[0]}"
+    assert wheel_signs(queries["tip"]) == signs(EVALUATION.queries["query_types"].iloc[0])
     assert not any(re.fullmatch(r"p\d+|near\d+", name) for name in queries["aliases"])
     assert queries["form"]["Figures"] == ["evaluation_figures"]
     assert layers[figures]["aliases"]["p50"] == "Error at most 50 m"
@@ -134,8 +142,22 @@ def test_answer_opens_as_a_project(
     candidates = layers["Candidates"]
     assert list(projects[name]["groups"]) == ["Answer"]
     assert (candidates["name"], candidates["label"]) == ("candidate 1", 1)
-    assert wheel_letters(candidates["tip"]) == [*answer.candidates["types"].iloc[0]]
+    assert wheel_signs(candidates["tip"]) == signs(answer.candidates["types"].iloc[0])
+    lat, lon = (answer.candidate_rows()[0][name] for name in ("lat", "lon"))
+    links = place_links(lat, lon)
+    assert [*map(tuple, candidates["actions"])] == [*links.items()]
+    assert all(f'<a href="{escape(link)}">{title}</a>' in candidates["tip"]
+               for title, link in links.items())  # fmt: skip
     assert layers["Regions to search"]["aliases"]["km2"] == "Area (km²)"
+
+
+def test_candidates_with_a_chance_below_1_percent_are_not_drawn(projects: dict[str, Any]) -> None:
+    likely = int((LOCATION.candidates["chance"] >= 0.01).sum())
+    layers = projects["likely"]["layers"]
+    assert layers["Candidates"]["shown"] == likely < len(LOCATION.candidates)
+    assert layers["Candidates"]["features"] == len(LOCATION.candidates)
+    near = projects["near"]["layers"]["Candidates"]
+    assert near["shown"] == near["features"]  # this method has no chances
 
 
 def test_qgis_evaluates_no_texts_from_data(projects: dict[str, Any]) -> None:
