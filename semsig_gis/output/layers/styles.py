@@ -248,19 +248,16 @@ def by_rank(column: str, *, geometry: str) -> Style:
 
 def by_outcome(*, geometry: str) -> Style:
     """Return a style of queries by outcome; a line ends in a mark at the best place."""
-    return _by_mark("Outcome", "query", OUTCOMES, geometry)
+    return _by_mark("Outcome", OUTCOMES, geometry)
 
 
 def by_answer(*, geometry: str) -> Style:
     """Return a style of the best place or its ellipse, by whether it is the answer or withheld."""
-    return _by_mark("Answer", "answer", ANSWERS, geometry)
+    return _by_mark("Answer", ANSWERS, geometry, label="answer {}")
 
 
-def _by_mark(name: str, what: str, marks: Mapping[str, Mark], geometry: str) -> Style:
-    """Return a style by the column with the name of the style, in lower case.
-
-    A label is `what` with the value, as in "answer withheld".
-    """
+def _by_mark(name: str, marks: Mapping[str, Mark], geometry: str, label: str = "{}") -> Style:
+    """Return a style by the column with the name of the style, in lower case."""
     classes = []
     for value, mark in marks.items():
         symbol = Symbol(colour=mark.colour, shape=mark.shape, metres=12.0, least_mm=1.8)
@@ -270,7 +267,7 @@ def _by_mark(name: str, what: str, marks: Mapping[str, Mark], geometry: str) -> 
             symbol = replace(end, opacity=0.59)
         if geometry == "polygon":
             symbol = Symbol(colour=mark.colour, opacity=0.0, edge=mark.colour, edge_mm=0.6)
-        classes.append(StyleClass(label=f"{what} {value}", symbol=symbol, value=value))
+        classes.append(StyleClass(label=label.format(value), symbol=symbol, value=value))
     return Style(name=name, column=name.lower(), classes=tuple(classes))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import json
 import os
@@ -35,6 +36,7 @@ from worlds import CORNER, World, assert_same
 
 from semsig_gis.core import (
     OUTCOMES,
+    PICTOGRAMS,
     DatabaseError,
     EmptyResultError,
     GridSpec,
@@ -275,7 +277,10 @@ def test_every_layer_has_a_style(file: Path, tmp_path: Path) -> None:
         root = ET.fromstring(qml)  # noqa: S314 - our own
         fields = {*pyogrio.read_info(source, layer=layer)["fields"]}
         assert {item.attrib["field"] for item in root.findall("aliases/alias")} == fields
-        assert {item.attrib["attr"] for item in root.findall("renderer-v2")} <= fields
+        drawn = [item.attrib["attr"] for item in root.findall("renderer-v2")]
+        # An expression decides which features are drawn, or there is only the name of a field.
+        named = [re.findall(r'"(\w+)"', text) or [text] for text in drawn]
+        assert {name for names in named for name in names} <= fields
         assert (root.find("renderer-v2") is None) == (layer == "evaluation_figures")
         used = {item.attrib["symbol"] for item in root.iter() if "symbol" in item.attrib}
         assert used == {item.attrib["name"] for item in root.findall("renderer-v2/symbols/symbol")}
@@ -370,7 +375,8 @@ def test_file_that_is_opened_during_the_export_is_unchanged(tmp_path: Path) -> N
 
 
 def test_objects_have_the_signs_of_their_classes() -> None:
-    taxonomy = paper_taxonomy()
+    classes = paper_taxonomy().classes
+    taxonomy = Taxonomy((*classes[:-1], dataclasses.replace(classes[-1], name="stop_of_ours")))
     root = ET.fromstring(renderer(by_class(taxonomy, [1, 5, 11]), "point"))  # noqa: S314 - our own
     by_name = {item.attrib["name"]: item for item in root.iter("symbol")}
     symbols = {
@@ -379,13 +385,21 @@ def test_objects_have_the_signs_of_their_classes() -> None:
     assert sorted(symbols, key=int) == ["1", "5", "11"]
     for code, symbol in symbols.items():
         sign = class_signs(taxonomy)[int(code)]
-        shape, letter = (
+        shape, drawing = (
             {item.attrib.get("name"): item.attrib.get("value") for item in layer.iter("Option")}
             for layer in symbol.iter("layer")
         )
         assert shape["name"] == CLASS_MARKERS[sign.shape][0]
-        assert letter["chr"] == sign.symbol
-        for options, colour in ((shape, sign.colour), (letter, sign.ink)):
+        colours = [(shape, sign.colour)]
+        pictogram = PICTOGRAMS.get(taxonomy.by_code(int(code)).name)
+        if pictogram is None:
+            assert drawing["chr"] == sign.symbol
+            colours.append((drawing, sign.ink))
+        else:
+            svg = base64.b64decode(str(drawing["name"]).removeprefix("base64:")).decode()
+            assert pictogram in svg
+            assert sign.ink in svg
+        for options, colour in colours:
             assert options["color"] == ",".join(map(str, (*bytes.fromhex(colour[1:]), 255)))
 
 
