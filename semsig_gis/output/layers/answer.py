@@ -177,6 +177,7 @@ def answer_layers(
         reach=database.reach,
     )
     chances = answer.candidates.get("chance")
+    rank = answer.candidates.columns[0]
     drawn = len(candidates) if chances is None else max(int((chances >= LEAST_CHANCE).sum()), 1)
     layers = [
         layer(
@@ -208,9 +209,9 @@ def answer_layers(
                 signature=("types", "bearings", "distances", " "),
                 tip=("address", "chance", "distance"),
                 label=CANDIDATE_LABEL,
-                shown=f"{RANK} <= {drawn}",
+                shown=f'"{rank}" <= {drawn}',
             ),
-            styles=(by_rank(str(answer.candidates.columns[0]), geometry="point"),),
+            styles=(by_rank(str(rank), geometry="point"),),
         ),
     ]
     if not isinstance(answer, Location):

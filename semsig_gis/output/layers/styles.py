@@ -19,7 +19,6 @@ from semsig_gis.core import (
     FOUND_RAMP,
     GROUP_COLOURS,
     OUTCOMES,
-    PICTOGRAMS,
     RANK_RAMP,
     SHADES,
     class_signs,
@@ -140,8 +139,7 @@ class Symbol:
 
     A point is a ``shape`` of ``metres`` on the ground, and of at least ``least_mm`` on the screen;
     a line ends in the shape, if there is one. ``edge`` is the colour of the outline, and ``sign``
-    the class with the letter that is drawn on the shape, or its ``pictogram`` (SVG path data in a
-    box of 16 x 16), if there is one.
+    the class with the pictogram or the letter that is drawn on the shape.
     """
 
     colour: str
@@ -152,7 +150,6 @@ class Symbol:
     edge: str = ""
     edge_mm: float = 0.1
     sign: ClassSign | None = None
-    pictogram: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,16 +191,13 @@ CELLS_OPACITY = 0.7
 def by_class(taxonomy: Taxonomy, codes: Iterable[int]) -> Style:
     """Return a style of points by class code: the shape of the class with its pictogram."""
     present = set(codes)
-    drawings = {item.code: PICTOGRAMS.get(item.name, "") for item in taxonomy.classes}
     return Style(
         name="Classes",
         column="class_code",
         classes=tuple(
             StyleClass(
                 label=sign.title,
-                symbol=Symbol(
-                    colour=sign.colour, shape=sign.shape, sign=sign, pictogram=drawings[code]
-                ),
+                symbol=Symbol(colour=sign.colour, shape=sign.shape, sign=sign),
                 value=str(code),
             )
             for code, sign in class_signs(taxonomy).items()

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import lazy_loader
 
 from semsig_gis import __version__
-from semsig_gis.core import PICTOGRAMS, class_signs, epsg_code, one_line
+from semsig_gis.core import GENERAL_PICTOGRAM, class_signs, epsg_code, one_line
 from semsig_gis.output.layers.columns import LINKS, shown_lines
 from semsig_gis.output.qgis.qml import SYMBOLS, renderer
 
@@ -102,9 +102,9 @@ class ShownLayer:
 
     @property
     def pictograms(self) -> dict[str, str]:
-        """Pictograms of the classes by their symbols, of those that have one."""
-        classes = () if self.layer.taxonomy is None else self.layer.taxonomy.classes
-        return {item.symbol: PICTOGRAMS[item.name] for item in classes if item.name in PICTOGRAMS}
+        """Pictograms of the classes that have one, by their symbols."""
+        drawings = {sign.symbol: sign.pictogram for sign in self.signs}
+        return {name: path for name, path in drawings.items() if path != GENERAL_PICTOGRAM}
 
     @property
     def links(self) -> list[Column]:

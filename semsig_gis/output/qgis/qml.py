@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
+from semsig_gis.core import GENERAL_PICTOGRAM
 from semsig_gis.output.layers.columns import shown_lines
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def _layers(symbol: Symbol, geometry: str) -> tuple[SymbolLayer, ...]:
         end = {"placement": "lastvertex", "rotate": 0}
         return ("SimpleLine", line), ("MarkerLine", end, _marker(symbol))
     if symbol.sign is not None:
-        return _class_layers(symbol.sign, symbol.pictogram)
+        return _class_layers(symbol.sign)
     return (_marker(symbol),)
 
 
@@ -101,9 +102,10 @@ def _marker(symbol: Symbol) -> SymbolLayer:
     return "SimpleMarker", {**marker, **edge, **size}
 
 
-def _class_layers(sign: ClassSign, pictogram: str) -> tuple[SymbolLayer, SymbolLayer]:
-    """Return the symbol layers of a class: its shape and its pictogram, or else its letter."""
-    marker, angle, size, outline = CLASS_MARKERS[sign.shape]
+def _class_layers(sign: ClassSign) -> tuple[SymbolLayer, SymbolLayer]:
+    """Return the symbol layers of a class: its pictogram on a disc, or its letter on its shape."""
+    own = sign.pictogram != GENERAL_PICTOGRAM
+    marker, angle, size, outline = CLASS_MARKERS["circle" if own else sign.shape]
     edge = _of_circle("outline_width", outline) if outline else {"outline_width": 0.1}
     shape = {
         "name": marker,
@@ -114,32 +116,26 @@ def _class_layers(sign: ClassSign, pictogram: str) -> tuple[SymbolLayer, SymbolL
         **edge,
         **_of_circle("size", size),
     }
-    # The anchor moves the drawing up by half its size and the offset moves it down again, because
-    # QGIS does not limit negative lengths.
-    if pictogram:
-        drawing = base64.b64encode(SVG.format(pictogram, sign.ink).encode()).decode()
-        picture = {"name": f"base64:{drawing}", **_placed(PICTOGRAM, sign.drop / 2 + PICTOGRAM / 2)}
+    if own:
+        drawing = base64.b64encode(SVG.format(sign.pictogram, sign.ink).encode()).decode()
+        picture = {"name": f"base64:{drawing}", **_of_circle("size", PICTOGRAM, smallest=0.0)}
         return ("SimpleMarker", shape), ("SvgMarker", picture)
+    # The anchor moves the letter up by half its size and the offset moves it down again, because
+    # QGIS does not limit negative lengths. The offset is a tenth smaller, because QGIS centres the
+    # ascent, which is higher than capital letters.
+    down = sign.drop / 2 + (0.5 - 0.1) * LETTER
     letter = {
         "font": "DejaVu Sans",
         "font_style": "Bold",
         "chr": sign.symbol,
         "color": _rgba(sign.ink),
-        # A tenth smaller, because QGIS centres the ascent, which is higher than capital letters.
-        **_placed(LETTER, sign.drop / 2 + (0.5 - 0.1) * LETTER),
-    }
-    return ("SimpleMarker", shape), ("FontMarker", letter)
-
-
-def _placed(size: float, down: float) -> Options:
-    """Return the size of what is drawn on a sign, and its offset downwards, in diameters."""
-    return {
         "horizontal_anchor_point": 1,
         "vertical_anchor_point": 2,
-        **_of_circle("size", size, smallest=0.0),
+        **_of_circle("size", LETTER, smallest=0.0),
         **_of_circle("offset", down, smallest=0.0),
         "offset": f"0,{CIRCLE_METRES * down:.3g}",
     }
+    return ("SimpleMarker", shape), ("FontMarker", letter)
 
 
 def _of_circle(length: str, share: float, *, smallest: float = SMALLEST_MM) -> Options:
