@@ -183,6 +183,8 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
             values["server"] = values.get("server") or settings.value(settings.OVERPASS)
         outputs = self._outputs(values, parameters, context)
         line = command_line(self.tool.command, self.command, values)
+        if not self.tool.printed:
+            line.insert(1, "--tables")  # the log has room for the details
         own = [values[name] for name, option in self.options.items() if "x-writes" in option]
         first = next((path for path in own if path and Path(path).suffix), None)
         printed = self._call(line, feedback, first)

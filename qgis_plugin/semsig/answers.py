@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from html import escape
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["doubt", "log_text", "percent"]
+__all__ = ["doubt", "likely", "links_line", "log_text", "percent", "words"]
 
 BORDER = re.compile("[┏┡└]")
 BARS = re.compile("[┃│]")
+LEAST_CHANCE = 0.01  # as in the layers of an answer
 # As in `semsig_gis.localization`.
 LEAST_ELSEWHERE, LEAST_FIT = 0.1, 0.01
 
@@ -72,6 +75,56 @@ def percent(chance: float, tr: Callable[[str], str] = str) -> str:
     if chance > 0.995:  # noqa: PLR2004 - as `semsig_gis.core.percent`
         return tr("over 99 %")
     return tr("under 1 %") if chance < 0.01 else f"{100 * chance:.0f} %"  # noqa: PLR2004
+
+
+def words(types: str, titles: dict[str, str]) -> str:
+    """Return what is seen in words, in its order, with equal neighbours counted.
+
+    Parameters
+    ----------
+    types : str
+        Symbols of classes.
+    titles : dict of str to str
+        The title of each symbol.
+
+    Returns
+    -------
+    str
+        The titles in lower case.
+
+    Examples
+    --------
+    >>> words("MDD", {"M": "Bus stop", "D": "Street light"})
+    'bus stop, 2 × street light'
+    """
+    counts = [
+        (titles.get(symbol, symbol).lower(), len([*group])) for symbol, group in groupby(types)
+    ]
+    return ", ".join(title if count == 1 else f"{count} × {title}" for title, count in counts)
+
+
+def likely(candidates: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the candidates with a chance of at least 1 %, and the best in any case.
+
+    Examples
+    --------
+    >>> likely([{"chance": 0.005}, {"chance": 0.001}])
+    [{'chance': 0.005}]
+    """
+    return candidates[:1] + [row for row in candidates[1:] if row["chance"] >= LEAST_CHANCE]
+
+
+def links_line(links: dict[str, str]) -> str:
+    """Return links as a line of HTML.
+
+    Examples
+    --------
+    >>> links_line({"Map": "https://a.org/?x=1&y=2"})
+    '<a href="https://a.org/?x=1&amp;y=2">Map</a>'
+    """
+    return " · ".join(
+        f'<a href="{escape(link)}">{escape(title)}</a>' for title, link in links.items()
+    )
 
 
 def doubt(answer: dict[str, Any], tr: Callable[[str], str] = str) -> str:

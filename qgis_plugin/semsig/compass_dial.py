@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple, Optional
 
 from qgis.PyQt.QtCore import QPointF, QRectF, QSize, Qt, pyqtSignal
 from qgis.PyQt.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
+from qgis.PyQt.QtSvg import QSvgRenderer
 from qgis.PyQt.QtWidgets import QToolTip, QWidget
 
 if TYPE_CHECKING:
@@ -15,7 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["CompassDial", "Mark", "Sign", "sign_icon"]
 
-MARGIN, DISC = 18.0, 9.0  # pixels
+MARGIN, DISC = 18.0, 10.0  # pixels
+PICTURE = 0.65  # half of the side of a pictogram, in radii of its disc
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16"><path d="{}" fill="{}"/></svg>'
 RINGS = (0.33, 0.66, 1.0)  # shares of the radius
 
 
@@ -26,6 +29,8 @@ class Sign(NamedTuple):
     symbol: str
     colour: str
     ink: str
+    pictogram: str = ""
+    """SVG path data in a box of 16 x 16; empty for the letter."""
 
 
 class Mark(NamedTuple):
@@ -37,7 +42,7 @@ class Mark(NamedTuple):
 
 
 def paint_sign(painter: QPainter, sign: Sign, place: QPointF, radius: float = DISC) -> None:
-    """Draw a disc in the colour of a class, with its letter.
+    """Draw a disc in the colour of a class, with its pictogram or letter.
 
     Parameters
     ----------
@@ -53,6 +58,11 @@ def paint_sign(painter: QPainter, sign: Sign, place: QPointF, radius: float = DI
     painter.setPen(QPen(QColor("white"), 1.5))
     painter.setBrush(QColor(sign.colour))
     painter.drawEllipse(place, radius, radius)
+    if sign.pictogram:
+        half = PICTURE * radius
+        box = QRectF(place.x() - half, place.y() - half, 2 * half, 2 * half)
+        QSvgRenderer(SVG.format(sign.pictogram, sign.ink).encode()).render(painter, box)
+        return
     painter.setPen(QColor(sign.ink))
     font = painter.font()
     font.setPixelSize(int(radius * 1.25))

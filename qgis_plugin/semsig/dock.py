@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import tempfile
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,9 +36,9 @@ from qgis.PyQt.QtWidgets import (
     QWidget,
 )
 
-from .answers import doubt, percent
+from .answers import doubt, likely, links_line, percent, words
 from .compass_dial import CompassDial, Mark, Sign, sign_icon
-from .results import replace_answer
+from .results import remove_answer, replace_answer, restore_cells
 from .server import CityServer
 from .translation import tr
 
@@ -74,6 +75,7 @@ class SemsigDock(QgsDockWidget):
         self.server = CityServer(self)
         self.server.opened.connect(self._show_city)
         self.candidates: list[dict[str, Any]] = []
+        self.titles: dict[str, str] = {}  # of classes, by symbol
         self.bands: list[QgsRubberBand] = []
         self.tool: QgsMapToolEmitPoint | None = None
         self.answers = tempfile.TemporaryDirectory(prefix="semsig")
@@ -118,6 +120,8 @@ class SemsigDock(QgsDockWidget):
         self.find.clicked.connect(self.ask_place)
         self.verdict = QLabel()
         self.verdict.setWordWrap(True)
+        self.verdict.setTextFormat(Qt.TextFormat.RichText)
+        self.verdict.setOpenExternalLinks(True)
         self.table = self._candidate_table()
 
     def _lay_out_widgets(self) -> None:
@@ -135,8 +139,8 @@ class SemsigDock(QgsDockWidget):
 
     def _candidate_table(self) -> QTableWidget:
         """Return the table of candidates."""
-        table = QTableWidget(0, 3)
-        table.setHorizontalHeaderLabels([tr("Rank"), tr("Chance"), tr("Sees")])
+        table = QTableWidget(0, 4)
+        table.setHorizontalHeaderLabels([tr("Rank"), tr("Chance"), tr("Place"), tr("Sees")])
         table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -194,9 +198,16 @@ class SemsigDock(QgsDockWidget):
         )
         self.dial.reach = city["radius"]
         self.dial.signs = {
-            item["name"]: Sign(item["title"], item["symbol"], item["colour"], item["ink"])
+            item["name"]: Sign(
+                item["title"],
+                item["symbol"],
+                item["colour"],
+                item["ink"],
+                item.get("pictogram", ""),
+            )
             for item in city["classes"]
         }
+        self.titles = {sign.symbol: sign.title for sign in self.dial.signs.values()}
         self.palette_.clear()
         for name, sign in self.dial.signs.items():
             entry = QListWidgetItem(sign_icon(sign), sign.title)
@@ -275,14 +286,14 @@ class SemsigDock(QgsDockWidget):
         self.server.ask("answer", question, partial(self._show_lookalikes, cell))
 
     def _show_lookalikes(self, cell: dict[str, Any], answer: dict[str, Any]) -> None:
-        candidates = answer["candidates"]
+        candidates = likely(answer["candidates"])
         others = [row["place"] for row in candidates if row["cell_id"] != cell["cell"]]
         self._remove_highlights()
         self._highlight(others, LOOKALIKE_COLOUR, 12)
         self._highlight([cell["place"]], CELL_COLOUR, 20)
         self.message.setText(
-            tr("Cell {cell} sees {types}; {count} other cells see the same types.").format(
-                cell=cell["cell"], types=cell["types"], count=f"{cell['alike']:,}"
+            tr("Seen from here: {seen}. {count} other cells see the same in this order.").format(
+                seen=words(cell["types"], self.titles), count=f"{cell['alike']:,}"
             )
         )
         self._list(answer, tr("The places that a view from here may be confused with, by chance:"))
@@ -318,8 +329,10 @@ class SemsigDock(QgsDockWidget):
         self.dial.show_marks([Mark(mark.kind, mark.bearing) for mark in marks])
 
     def clear_view(self) -> None:
-        """Remove all objects of the view, and the candidates."""
+        """Remove all objects of the view, and the answer."""
         self.dial.show_marks([])
+        remove_answer()
+        restore_cells()
         self._remove_highlights()
         self.verdict.setText("")
         self.table.setRowCount(0)
@@ -348,7 +361,10 @@ class SemsigDock(QgsDockWidget):
             metres=f"{answer['radius']:g}",
             chance=percent(answer["mass"], tr),
         )
-        self._list(answer, f"{text} {doubt(answer, tr)}".rstrip())
+        best = answer["candidates"][0] if answer["candidates"] else {}
+        lines = [text, doubt(answer, tr), answer.get("place_name") or ""]
+        lines = [escape(line) for line in lines if line]
+        self._list(answer, "<br>".join([*lines, links_line(best.get("links", {}))]))
         self.message.setText(tr("Choose a rank in the list to go there."))
         self._go_to([candidate["place"] for candidate in self.candidates[:3]])
         self.server.ask("export?format=gpkg", question, self._show_layers)
@@ -362,18 +378,24 @@ class SemsigDock(QgsDockWidget):
 
     def _list(self, answer: dict[str, Any], verdict: str) -> None:
         """Show the candidates of an answer in the table."""
-        self.candidates = answer["candidates"]
+        self.candidates = likely(answer["candidates"])
         self.verdict.setText(verdict)
         self.table.blockSignals(True)  # noqa: FBT003 - as Qt calls it
         self.table.setRowCount(len(self.candidates))
         for row, candidate in enumerate(self.candidates):
-            texts = str(candidate["rank"]), percent(candidate["chance"], tr), candidate["types"]
+            texts = (
+                *(str(candidate["rank"]), percent(candidate["chance"], tr)),
+                *(candidate.get("place_name") or "", words(candidate["types"], self.titles)),
+            )
             for column, text in enumerate(texts):
                 item = QTableWidgetItem(text)
+                item.setToolTip(text)
                 if column < 2:  # noqa: PLR2004 - the numbers
                     right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
                     item.setTextAlignment(right)
                 self.table.setItem(row, column, item)
+        named = any(candidate.get("place_name") for candidate in self.candidates)
+        self.table.setColumnHidden(2, not named)
         self.table.resizeColumnsToContents()
         self.table.clearSelection()
         self.table.blockSignals(False)  # noqa: FBT003

@@ -11,22 +11,36 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingLayerPostProcessorInterface,
     QgsProject,
+    QgsRenderContext,
+    QgsSingleSymbolRenderer,
     QgsVectorLayer,
 )
 from qgis.PyQt.QtCore import QTimer
-from qgis.PyQt.QtGui import QPainter
+from qgis.PyQt.QtGui import QColor, QPainter
 
 from .translation import tr
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from qgis.core import QgsLayerTreeGroup, QgsProcessingFeedback
 
-__all__ = ["add_layers", "replace_answer", "show_layers"]
+__all__ = [
+    "add_layers",
+    "mute_cells",
+    "remove_answer",
+    "replace_answer",
+    "restore_cells",
+    "show_layers",
+]
 
 BLENDED = ("regions",)
 """Layers of areas through which the layers below stay visible."""
+MUTED = ("cells", "hexagons")
+"""Layers that turn grey when there is an answer."""
+GREY = QColor(190, 190, 186, 140)
 KEY = "semsig"
-"""Custom property of the layers of the dock."""
+"""Custom property of the layers of the dock, and of the style that the grey one replaces."""
 LOWEST = 3
 
 
@@ -89,11 +103,54 @@ def _move_to_group(identifier: str, title: str) -> None:
 
 
 def _apply_style(layer: QgsVectorLayer) -> None:
-    """Apply the style that is stored in the GeoPackage of a layer."""
+    """Apply the style that is stored in the GeoPackage of a layer; an answer mutes the cells."""
     layer.loadDefaultStyle()
-    if layer.source().endswith(tuple(f"|layername={name}" for name in BLENDED)):
+    if _is_one_of(layer, BLENDED):
         layer.setBlendMode(QPainter.CompositionMode.CompositionMode_Multiply)
+        mute_cells()
     layer.triggerRepaint()
+
+
+def _is_one_of(layer: Any, names: tuple[str, ...]) -> bool:  # noqa: ANN401 - any kind of layer
+    """Return whether a layer has one of the names in a GeoPackage."""
+    return bool(layer.source().endswith(tuple(f"|layername={name}" for name in names)))
+
+
+def _cell_layers() -> Iterator[QgsVectorLayer]:
+    """Yield the layers of cells in the project."""
+    for layer in QgsProject.instance().mapLayers().values():
+        if isinstance(layer, QgsVectorLayer) and _is_one_of(layer, MUTED):
+            yield layer
+
+
+def mute_cells() -> None:
+    """Draw the cells in grey, so that an answer is visible; their style is kept for later."""
+    grey = tr("Grey")
+    for layer in _cell_layers():
+        manager = layer.styleManager()
+        style = manager.currentStyle()
+        symbols = layer.renderer().symbols(QgsRenderContext())
+        if style == grey or not symbols:
+            continue
+        symbol = symbols[0].clone()
+        symbol.setColor(GREY)
+        for part in symbol.symbolLayers():
+            part.setStrokeColor(GREY)
+        manager.addStyleFromLayer(grey)
+        manager.setCurrentStyle(grey)
+        layer.setCustomProperty(KEY, style)
+        layer.setRenderer(QgsSingleSymbolRenderer(symbol))
+        layer.triggerRepaint()
+
+
+def restore_cells() -> None:
+    """Draw the cells in the style that `mute_cells` replaced."""
+    for layer in _cell_layers():
+        manager = layer.styleManager()
+        if manager.currentStyle() == tr("Grey"):
+            manager.setCurrentStyle(layer.customProperty(KEY))
+            manager.removeStyle(tr("Grey"))
+            layer.triggerRepaint()
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
@@ -151,9 +208,7 @@ def add_layers(
 def replace_answer(path: str) -> None:
     """Show the layers of an answer of the dock, in place of those of the previous answer."""
     project = QgsProject.instance()
-    project.removeMapLayers(
-        [name for name, layer in project.mapLayers().items() if layer.customProperty(KEY)]
-    )
+    remove_answer()
     group = _group_of(tr("Answer"))
     for name, title in _titles(path).items():
         layer = QgsVectorLayer(_source(path, name), tr(title), "ogr")
@@ -161,3 +216,17 @@ def replace_answer(path: str) -> None:
         _apply_style(layer)
         project.addMapLayer(layer, False)  # noqa: FBT003 - as QGIS calls it: not into the tree
         group.insertLayer(_place_in_group(group, layer), layer)
+    group.setExpanded(False)  # or QGIS ignores the next line
+    group.setExpanded(True)
+
+
+def remove_answer() -> None:
+    """Remove the layers of the answer of the dock."""
+    layers = QgsProject.instance().mapLayers().items()
+    QgsProject.instance().removeMapLayers(
+        [
+            name
+            for name, layer in layers
+            if layer.customProperty(KEY) and not _is_one_of(layer, MUTED)
+        ]
+    )
