@@ -140,6 +140,10 @@
         <translation>Vergleich auf Fotos</translation>
     </message>
     <message>
+        <source>Best place: {place}</source>
+        <translation>Bester Ort: {place}</translation>
+    </message>
+    <message>
         <source>Box in degrees, a polygon file, or the name of a place.</source>
         <translation>Rechteck in Grad, eine Datei mit Polygonen oder der Name eines Ortes.</translation>
     </message>
@@ -236,10 +240,6 @@
         <translation>Kataloge offener Daten</translation>
     </message>
     <message>
-        <source>Cell {cell} sees {types}; {count} other cells see the same types.</source>
-        <translation>Zelle {cell} sieht {types}; {count} andere Zellen sehen dieselben Arten.</translation>
-    </message>
-    <message>
         <source>Cells</source>
         <translation>Zellen</translation>
     </message>
@@ -286,6 +286,10 @@
     <message>
         <source>Class of false objects</source>
         <translation>Klasse falscher Objekte</translation>
+    </message>
+    <message>
+        <source>Classes as letters</source>
+        <translation>Klassen als Buchstaben</translation>
     </message>
     <message>
         <source>Clear</source>
@@ -704,6 +708,10 @@
         <translation>Einen Download nach dieser Zeit aufgeben, alle Versuche zusammen.</translation>
     </message>
     <message>
+        <source>Grey</source>
+        <translation>Grau</translation>
+    </message>
+    <message>
         <source>Heading</source>
         <translation>Blickrichtung</translation>
     </message>
@@ -1084,6 +1092,10 @@
         <translation>Genauigkeit vorhersagen</translation>
     </message>
     <message>
+        <source>Print classes in tables as letters, such as DDBL, instead of words.</source>
+        <translation>Klassen in Tabellen als Buchstaben ausgeben, etwa DDBL, statt als Wörter.</translation>
+    </message>
+    <message>
         <source>Print the properties of a database next to those in the paper.</source>
         <translation>Zeigt die Eigenschaften einer Datenbank neben denen im Aufsatz.</translation>
     </message>
@@ -1298,6 +1310,10 @@
     <message>
         <source>Seen from here</source>
         <translation>Von hier gesehen</translation>
+    </message>
+    <message>
+        <source>Seen from here: {seen}. {count} other cells see the same in this order.</source>
+        <translation>Von hier zu sehen: {seen}. {count} weitere Zellen sehen das Gleiche in dieser Reihenfolge.</translation>
     </message>
     <message>
         <source>Sees</source>

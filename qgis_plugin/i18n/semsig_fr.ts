@@ -140,6 +140,10 @@
         <translation>Banc d’essai sur des photos</translation>
     </message>
     <message>
+        <source>Best place: {place}</source>
+        <translation>Meilleur lieu : {place}</translation>
+    </message>
+    <message>
         <source>Box in degrees, a polygon file, or the name of a place.</source>
         <translation>Emprise en degrés, fichier de polygones, ou nom d’un lieu.</translation>
     </message>
@@ -236,10 +240,6 @@
         <translation>Catalogues de données ouvertes</translation>
     </message>
     <message>
-        <source>Cell {cell} sees {types}; {count} other cells see the same types.</source>
-        <translation>La cellule {cell} voit {types} ; {count} autres cellules voient les mêmes types.</translation>
-    </message>
-    <message>
         <source>Cells</source>
         <translation>Cellules</translation>
     </message>
@@ -286,6 +286,10 @@
     <message>
         <source>Class of false objects</source>
         <translation>Classe des faux objets</translation>
+    </message>
+    <message>
+        <source>Classes as letters</source>
+        <translation>Classes en lettres</translation>
     </message>
     <message>
         <source>Clear</source>
@@ -704,6 +708,10 @@
         <translation>Abandonner un téléchargement après ce temps, tous essais compris.</translation>
     </message>
     <message>
+        <source>Grey</source>
+        <translation>Gris</translation>
+    </message>
+    <message>
         <source>Heading</source>
         <translation>Cap</translation>
     </message>
@@ -1084,6 +1092,10 @@
         <translation>Prédire l’exactitude</translation>
     </message>
     <message>
+        <source>Print classes in tables as letters, such as DDBL, instead of words.</source>
+        <translation>Afficher les classes des tableaux en lettres, comme DDBL, au lieu de mots.</translation>
+    </message>
+    <message>
         <source>Print the properties of a database next to those in the paper.</source>
         <translation>Montre les propriétés d’une base à côté de celles de l’article.</translation>
     </message>
@@ -1298,6 +1310,10 @@
     <message>
         <source>Seen from here</source>
         <translation>Vu d’ici</translation>
+    </message>
+    <message>
+        <source>Seen from here: {seen}. {count} other cells see the same in this order.</source>
+        <translation>Vu d’ici : {seen}. {count} autres cellules voient la même chose dans cet ordre.</translation>
     </message>
     <message>
         <source>Sees</source>

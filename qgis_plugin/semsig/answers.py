@@ -97,10 +97,11 @@ def words(types: str, titles: dict[str, str]) -> str:
     >>> words("MDD", {"M": "Bus stop", "D": "Street light"})
     'bus stop, 2 × street light'
     """
-    counts = [
-        (titles.get(symbol, symbol).lower(), len([*group])) for symbol, group in groupby(types)
-    ]
-    return ", ".join(title if count == 1 else f"{count} × {title}" for title, count in counts)
+    parts = []
+    for symbol, group in groupby(types):
+        title, count = titles.get(symbol, symbol).lower(), len([*group])
+        parts.append(title if count == 1 else f"{count} × {title}")
+    return ", ".join(parts)
 
 
 def likely(candidates: list[dict[str, Any]]) -> list[dict[str, Any]]:

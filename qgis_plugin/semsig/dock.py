@@ -361,10 +361,12 @@ class SemsigDock(QgsDockWidget):
             metres=f"{answer['radius']:g}",
             chance=percent(answer["mass"], tr),
         )
-        best = answer["candidates"][0] if answer["candidates"] else {}
-        lines = [text, doubt(answer, tr), answer.get("place_name") or ""]
-        lines = [escape(line) for line in lines if line]
-        self._list(answer, "<br>".join([*lines, links_line(best.get("links", {}))]))
+        lat, lon = answer["estimate"]["place"]
+        place, name = f"{lat:.6f}, {lon:.6f}", answer.get("place_name")
+        place = f"{name} ({place})" if name else place
+        lines = [text, doubt(answer, tr), tr("Best place: {place}").format(place=place)]
+        links = links_line(answer["candidates"][0].get("links", {}))
+        self._list(answer, "<br>".join([*(escape(line) for line in lines if line), links]))
         self.message.setText(tr("Choose a rank in the list to go there."))
         self._go_to([candidate["place"] for candidate in self.candidates[:3]])
         self.server.ask("export?format=gpkg", question, self._show_layers)

@@ -40,7 +40,7 @@ sys.path += [
     str(PLACE / "profile" / "profiles" / "default" / "python" / "plugins"),
 ]
 
-import semsig  # noqa: E402 - from the profile
+import semsig.results  # noqa: E402 - from the profile
 from processing.core.Processing import Processing  # noqa: E402
 from processing.core.ProcessingConfig import ProcessingConfig  # noqa: E402
 from processing.gui.Postprocessing import handleAlgorithmResults  # noqa: E402
@@ -197,10 +197,29 @@ def show(query: dict[str, str]) -> dict[str, Any]:
     run_ok("export", OBJECTS=file("objects.parquet"), OUT=shown())
     layers = QgsProject.instance().mapLayers().values()
     renderers = {
-        layer.name(): [layer.renderer().type(), *layer.renderer().usedAttributes(EVERYWHERE)]
+        layer.name(): [
+            layer.renderer().type(),
+            *(
+                layer.renderer().usedAttributes(EVERYWHERE)
+                & {field.name() for field in layer.fields()}
+            ),
+        ]
         for layer in layers
     }
     return {"evaluated": evaluated.results, "identified": identified.results, "shown": renderers}
+
+
+def mute(query: dict[str, str]) -> dict[str, str]:
+    """Ask while cells are shown; return how they are drawn before, with the answer, and later."""
+    (cells,) = QgsProject.instance().mapLayersByName("Signature cells")[:1]
+    kinds = {"before": cells.renderer().type()}
+    run_ok("localize", OUT=shown(str(PLACE / "above.gpkg")), **query)
+    kinds |= {
+        "answered": cells.renderer().type(),
+        "colour": cells.renderer().symbol().color().name(),
+    }
+    semsig.results.restore_cells()
+    return kinds | {"restored": cells.renderer().type()}
 
 
 def groups() -> dict[str, list[str]]:
@@ -278,13 +297,14 @@ def play() -> dict[str, Any]:
     """Run all parts, and return their results."""
     objects = str(PLACE / "objects.parquet")
     lamps, loaded = [str(PLACE / "lamps.geojson")], str(PLACE / "session_lamps.parquet")
+    query = json.loads(sys.argv[3])
     cancelled = {"OUT": str(PLACE / "cancelled.parquet"), "CELLS": shown()}
     results = {
         "tools": tools(),
         "extent": default_extent(),
         "loaded": run("load", FILES=lamps, CATALOG_FILE=sys.argv[2], OUT=loaded).ended[0],
         **show_twice(),
-        **show(json.loads(sys.argv[3])),
+        **show(query),
         "groups": groups(),
         "order": [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()],
         "failed": stop("export", DATABASE=objects, OUT=str(PLACE / "fails.gpkg")),
@@ -292,6 +312,7 @@ def play() -> dict[str, Any]:
             "build", cancelling=True, OBJECTS=objects, STEP=1.0, RADIUS=100.0, **cancelled
         ),
     }
+    results["muted"] = mute(query)
     results["translations"] = translations()
     QgsProject.instance().clear()
     results["others"] = others()

@@ -382,6 +382,14 @@ def test_layers_are_shown_with_styles(session: dict[str, Any]) -> None:
     assert order.index("Queries") < order.index("From the true to the best place")
 
 
+def test_cells_turn_grey_below_an_answer(session: dict[str, Any]) -> None:
+    muted = session["muted"]
+    assert muted["before"] == muted["restored"] == "graduatedSymbol"
+    assert muted["answered"] == "singleSymbol"
+    red, green, blue = bytes.fromhex(muted["colour"][1:])
+    assert max(red, green, blue) - min(red, green, blue) < 10
+
+
 def test_qgis_reads_the_translations(session: dict[str, Any], package: SimpleNamespace) -> None:
     for language, texts in session["translations"].items():
         file = ROOT / "qgis_plugin" / "i18n" / f"semsig_{language}.ts"
@@ -413,8 +421,9 @@ def test_second_run_into_the_same_file_updates_the_layers(session: dict[str, Any
         assert new_rows < rows
         assert new_extent != extent
     assert ("Place" in first["layers"], "Place" in second["layers"]) == (False, True)
-    assert "to search: " in first["log"]
-    assert "to search: " in second["log"]
+    for log in (first["log"], second["log"]):
+        assert "to search: " in log.lower()
+        assert "rank | cell" in log  # a table
 
 
 def test_invalid_parameters_are_refused(session: dict[str, Any]) -> None:
