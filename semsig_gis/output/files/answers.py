@@ -136,8 +136,8 @@ def _add_place(
     for column, value in row.items():
         if not pd.isna(value):
             content = int(value) if isinstance(value, bool) else value  # as GDAL reads it
-            text = one_line(content) if isinstance(content, str) else content
-            _add_text(data, "SimpleData", text).set("name", str(column))
+            shown = one_line(content) if isinstance(content, str) else content
+            _add_text(data, "SimpleData", shown).set("name", str(column))
     if shape.geom_type != "Polygon":  # a point or a line
         _add_text(ET.SubElement(place, shape.geom_type), "coordinates", _coordinates(shape))
         return
