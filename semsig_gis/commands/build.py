@@ -142,10 +142,12 @@ class Build:
 
     def run(self, reporter: Reporter) -> Result:
         """Write the database; return its properties."""
+        import numpy as np
+
         from semsig_gis.core import GridSpec, SignatureSpec
         from semsig_gis.database import TileSpec, ViewpointSpec, build_tiles
         from semsig_gis.objects import ground_file, open_objects, read_area
-        from semsig_gis.storage import EMPTY_BOX
+        from semsig_gis.storage import EMPTY_BOX, bounds_by_group
 
         found = {
             role: ground_file(self.objects, role)
@@ -162,7 +164,11 @@ class Build:
         spec = SignatureSpec(self.radius, self.levels)
         # The objects of tiles are read tile by tile; here only their CRS is needed.
         objects = open_objects(self.objects, box=EMPTY_BOX if in_tiles else None)
-        polygons = None if self.area is None else read_area(self.area, crs=objects.crs)
+        polygons = None
+        if self.area is not None:
+            boxes = np.concatenate([*bounds_by_group(self.objects), np.empty((0, 4))])
+            near = (*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)) if len(boxes) else None
+            polygons = read_area(self.area, crs=objects.crs, near=near)
         width = self.street_width / 2
         specs: dict[str, Any] = {
             "grid": grid,

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from semsig_gis.commands.load import LoadOptions, Quality, catalogs
 from semsig_gis.commands.model import Option, Reporter, Result, command
-from semsig_gis.core import InputError
+from semsig_gis.core import EmptyResultError, InputError
 
 
 @command("fetch", title="Download street objects", group="Street objects", order=2, returns=Quality)
@@ -104,6 +104,13 @@ class Fetch(LoadOptions):
                 filters=self.filter,
                 progress=advance,
                 tell=reporter.remark,
+            )
+        if not any(map(len, layers)):
+            low, high = place.bounds[:2], place.bounds[2:]
+            raise EmptyResultError(
+                f"nothing was found in {self.area}, latitude {low[1]:.10g} to {high[1]:.10g} and "
+                f"longitude {low[0]:.10g} to {high[0]:.10g}; give another area, and a box as "
+                "west,south,east,north."
             )
         with reporter.progress("joining the objects"):
             loaded = assemble(

@@ -485,7 +485,7 @@ class SearchOptions:
             # A known place is in the area.
             surely_here=self.surely_here or self.near is not None or self.area is not None,
         )
-        log_prior, knowledge = self._prior(city.database)
+        log_prior, knowledge = self._prior(city.database, reporter)
         needed = bool(self.refine)
         store = object_store(city, self.objects, reporter, needed=needed) if needs_objects else None
         return make_locator(
@@ -501,7 +501,9 @@ class SearchOptions:
             north=north or GRID_NORTH,
         )
 
-    def _prior(self, database: SignatureDatabase) -> tuple[NDArray[Any] | None, dict[str, Any]]:
+    def _prior(
+        self, database: SignatureDatabase, reporter: Reporter
+    ) -> tuple[NDArray[Any] | None, dict[str, Any]]:
         """Return the log prior of each cell, or None without a prior, and its plain values."""
         parts: list[NDArray[Any]] = []
         knowledge: dict[str, Any] = {}
@@ -511,11 +513,17 @@ class SearchOptions:
             place = KnownPosition.parse(self.near, database)
             parts.append(position_prior(database, (place.x, place.y), sigma=place.sigma))
             knowledge["near"] = place.to_dict()
+            if place.read_as == "LON,LAT":
+                reporter.remark(
+                    f"--near {self.near} is read as longitude,latitude, since only that is in the "
+                    "city; latitude comes first"
+                )
         if self.area is not None:
             from semsig_gis.localization import area_prior
             from semsig_gis.objects import read_area
 
-            parts.append(area_prior(database, read_area(self.area, crs=database.crs)))
+            area = read_area(self.area, crs=database.crs, near=database.bounds)
+            parts.append(area_prior(database, area))
             inside = int((parts[-1] > -math.inf).sum())
             knowledge["area"] = {"file": str(self.area), "cells": inside}
         if self.popularity is not None:

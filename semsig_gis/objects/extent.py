@@ -381,7 +381,7 @@ def _without_strays(located: _LocatedLayer, towns: _Towns) -> RawLayer:
 
 
 def _place(place: tuple[float, float]) -> str:
-    return f"longitude {place[0]:.5g}, latitude {place[1]:.5g}"
+    return f"latitude {place[1]:.5g}, longitude {place[0]:.5g}"
 
 
 def _box(bounds: Bounds) -> str:

@@ -14,7 +14,9 @@ from semsig_gis.sources import (
     NUMBERS,
     SUFFIXES,
     WGS84,
+    Area,
     LayerSpec,
+    exchanged_error,
     file_reader,
     frame_fields,
     frame_layers,
@@ -188,21 +190,33 @@ def _with_licences(layer: RawLayer) -> gpd.GeoDataFrame:
 
 
 def read_area(
-    area: str | Path | gpd.GeoDataFrame, *, crs: AnyCrs
+    area: str | Path | gpd.GeoDataFrame,
+    *,
+    crs: AnyCrs,
+    near: Sequence[float] | None = None,
 ) -> shapely.Polygon | shapely.MultiPolygon:
     """Return a box ``west,south,east,north`` in degrees, or the polygons of a file or table.
 
     The result is one (multi)polygon in `crs`. Errors are those of `parse_area` and
-    `read_surroundings`.
+    `read_surroundings`, and InputError if the area does not meet the box `near`, ``xmin, ymin,
+    xmax, ymax`` in `crs`, but would with latitude and longitude exchanged.
     """
+    system = parse_crs(crs)
     if isinstance(area, str | Path) and NUMBERS.fullmatch(str(area)):
         box = shapely.segmentize(parse_area(str(area)).polygon, EDGE_DEGREES)
-        shapes = transformed(np.array([box]), WGS84, parse_crs(crs))
+        shapes = transformed(np.array([box]), WGS84, system)
     else:
         shapes = _read(area, "area", crs).geometry.to_numpy()
     joined = join_areas(shapes)
     if joined is None:
         raise InputError(f"{_named(area)} encloses no area; give {_of_kind(area, 'polygon')}.")
+    if near is not None and not joined.intersects(box_near := shapely.box(*near)):
+        (degrees,) = transformed(np.array([joined]), system, WGS84)
+        exchanged = Area(degrees, _named(area)).exchanged
+        if exchanged is not None:
+            (shape,) = transformed(np.array([exchanged.polygon]), WGS84, system)
+            if np.isfinite(shape.bounds).all() and shape.intersects(box_near):
+                raise exchanged_error(Area(degrees, _named(area)))
     return joined
 
 

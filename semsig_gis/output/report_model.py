@@ -149,7 +149,7 @@ class Scene(Displayed):
         return {
             "title": self.title,
             "types": self.types or "none",
-            "place": f"{self.lon:.6f}°, {self.lat:.6f}°",
+            "place": f"{self.lat:.6f}°, {self.lon:.6f}°",
             "radius": f"{self.radius:g} m",
             "error": "not asked" if self.error_m is None else f"{self.error_m:,.1f} m",
         }

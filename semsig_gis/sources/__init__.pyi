@@ -1,6 +1,7 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
 from .area import Area as Area
+from .area import exchanged_error as exchanged_error
 from .area import join_areas as join_areas
 from .catalog import MEASURES as MEASURES
 from .catalog import Catalog as Catalog

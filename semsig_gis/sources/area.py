@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MOST_TILES = 10_000
+QUARTER_TURN = 90.0  # degrees of latitude
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,13 @@ class Area:
         """West, south, east and north in degrees."""
         west, south, east, north = self.polygon.bounds
         return west, south, east, north
+
+    @property
+    def exchanged(self) -> Area | None:
+        """The area with latitude and longitude exchanged; None if that is not on the Earth."""
+        polygon = shapely.transform(self.polygon, lambda xy: xy[:, ::-1])
+        _, south, _, north = polygon.bounds
+        return Area(polygon, self.name) if max(-south, north) <= QUARTER_TURN else None
 
     @property
     def boxes(self) -> tuple[tuple[float, float, float, float], ...]:
@@ -112,6 +120,16 @@ def fetch_tiles(
 
 def _touching(area: Area, tiles: Iterable[Tile]) -> list[Tile]:
     return [tile for tile in tiles if area.polygon.intersects(shapely.box(*tile.bounds))]
+
+
+def exchanged_error(area: Area) -> InputError:
+    """Return the error for an area that would be right with latitude and longitude exchanged."""
+    south, west, north, east = area.bounds
+    return InputError(
+        f"the area {area.name} is somewhere else, but it would be right with latitude and "
+        "longitude exchanged; write west,south,east,north, which is "
+        f"{west:.10g},{south:.10g},{east:.10g},{north:.10g}."
+    )
 
 
 def join_areas(geometry: NDArray[np.object_]) -> shapely.Polygon | shapely.MultiPolygon | None:

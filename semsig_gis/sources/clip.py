@@ -13,7 +13,7 @@ import shapely
 
 from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, InputError
 from semsig_gis.sources import vector
-from semsig_gis.sources.area import Area, join_areas
+from semsig_gis.sources.area import Area, exchanged_error, join_areas
 from semsig_gis.sources.layer import transformed
 from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.paths import FILE_SUFFIXES
@@ -66,10 +66,16 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
     if not (on_earth and (west < east or across)) or not (
         -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
     ):
+        exchanged = (
+            f" With latitude and longitude exchanged it is {south:.10g},{west:.10g},{north:.10g},"
+            f"{east:.10g}."
+            if -LATITUDE_LIMIT <= west < east <= LATITUDE_LIMIT and south < north
+            else ""
+        )
         raise InputError(
             f"bounding box {text!r} is not an area; write west,south,east,north in degrees, with "
             "west below east within -180 to 180, or above it across 180 degrees, and south below "
-            "north within -90 to 90."
+            f"north within -90 to 90.{exchanged}"
         )
     spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
     boxes = [shapely.box(start, south, end, north) for start, end in spans if start < end]
@@ -98,7 +104,7 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
     -------
     tuple of RawLayer
         The layers; their counts include the rows outside. InputError if the area is not valid, or
-        no file states its box.
+        contains no row but would with latitude and longitude exchanged, or no file states its box.
 
     Examples
     --------
@@ -119,7 +125,11 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
                 "to; write west,south,east,north in degrees, or the path of a file with polygons."
             )
         area = Area(polygon, BOX)
-    return tuple(clip_layer(layer, area) for layer in layers)
+    clipped = tuple(clip_layer(layer, area) for layer in layers)
+    exchanged = None if any(map(len, clipped)) else area.exchanged
+    if exchanged is not None and any(len(clip_layer(layer, exchanged)) for layer in layers):
+        raise exchanged_error(area)
+    return clipped
 
 
 def clip_to_extents(layers: Sequence[RawLayer]) -> tuple[tuple[RawLayer, ...], str]:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+import geopandas as gpd
 import pytest
+import shapely
 from osm_xml import node, way, write_osm
+from sentences import sentence
 
 from semsig_gis.database import open_city, open_store
 
@@ -131,3 +134,44 @@ def test_made_up_cities_have_ground(town: Path, run_ok: RunOk) -> None:  # noqa:
     city = open_city("made.parquet")
     assert city.database.viewpoints.mode == "outdoor"
     assert any(city.place_name(*xy).startswith(("on ", "at ")) for xy in city.database.xy)
+
+
+LAT_FIRST = "43.72,7.41,43.74,7.43"
+WANTED = ("latitude", "exchanged", "7.41,43.72,7.43,43.74")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        f"{LOAD} --clip {LAT_FIRST}",
+        f"build town.parquet --out c.parquet --area {LAT_FIRST}",
+        f"build town.parquet --out tiles --tile 100 --area {LAT_FIRST}",
+        f"localize city.parquet --types L --area {LAT_FIRST}",
+        "localize city.parquet --types L --area exchanged.geojson",
+    ],
+)
+def test_exchanged_latitude_and_longitude_of_an_area_are_noticed(
+    town: Path, run: Run, run_ok: RunOk, line: str
+) -> None:
+    run_ok(LOAD)
+    run_ok("build town.parquet --out city.parquet")
+    box = shapely.box(*map(float, LAT_FIRST.split(",")))
+    gpd.GeoDataFrame(geometry=[box], crs=4326).to_file(town / "exchanged.geojson")
+    sentence(run(line), *WANTED)
+
+
+def test_exchanged_latitude_and_longitude_of_a_position_are_noticed(
+    town: Path,  # noqa: ARG001
+    run: Run,
+    run_ok: RunOk,
+) -> None:
+    run_ok(LOAD)
+    run_ok("build town.parquet --out city.parquet")
+    for position, noticed in ((f"{LON},{LAT},90", True), (f"{LAT},{LON},90", False)):
+        _, _, err = run(f"localize city.parquet --types L --near {position}")
+        assert ("read as longitude,latitude" in err) == noticed
+
+
+def test_box_with_latitude_first_that_is_none_is_noticed(run: Run, town: Path) -> None:  # noqa: ARG001
+    line = f"{LOAD} --clip=-33.9,151.1,-33.8,151.3"
+    sentence(run(line), "is not an area", "exchanged", "151.1,-33.9,151.3,-33.8")

@@ -66,8 +66,8 @@ def loaded(*layers: RawLayer, **options: object) -> Loaded:
 
 ZERO = [(0.0, 0.0)]
 STRAYS = {  # rows with the strays last; number of strays; text about their places
-    "null island": ((town(HELSINKI), ZERO), 1, "longitude 0, latitude 0"),
-    "in the same zone": ((town(ACCRA), ZERO * 3), 3, "longitude 0, latitude 0"),
+    "null island": ((town(HELSINKI), ZERO), 1, "latitude 0, longitude 0"),
+    "in the same zone": ((town(ACCRA), ZERO * 3), 3, "latitude 0, longitude 0"),
     "in a small table": ((town(HELSINKI, size=3), ZERO), 1, "latitude 0"),
     "more rows than the city": ((town(HELSINKI), ZERO * 90), 90, "latitude 0"),
     "here and there": ((town(PARIS), [(99, 0), (1, 1), (50, 8), (9, 9)]), 4, "and 1 more places"),

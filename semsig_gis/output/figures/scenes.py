@@ -313,7 +313,7 @@ class _Column:
         lines = textwrap.wrap(types, TYPE_LETTERS) or ["sees nothing"]
         if scene.asked:
             lines.append("around the circle: the query")
-        place = f"{scene.lon:.6f}°, {scene.lat:.6f}°"
+        place = f"{scene.lat:.6f}°, {scene.lon:.6f}°"
         lines.append(" · ".join(filter(None, (place, _error_text(scene)))))
         return cls(scene, signs, titles, lines, _legend_keys(scene, signs))
 
@@ -465,7 +465,7 @@ def _scene_description(scene: Scene, signs: dict[int, ClassSign]) -> str:
         for code, number in sorted(Counter(item.code for item in scene.objects).items())
     )
     types = f"Signature {scene.types}, seen" if scene.types else "Nothing is seen"
-    place = f"from {scene.lon:.6f}, {scene.lat:.6f}"
+    place = f"from {scene.lat:.6f}, {scene.lon:.6f}"
     sentences = (
         scene.title,
         f"{types} {place}{f': {counts}' if counts else ''}",

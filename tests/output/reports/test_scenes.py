@@ -127,7 +127,7 @@ def test_scene_is_drawn_with_its_objects_and_legend(objects: int) -> None:
         count = example.types.count(symbol)
         assert shown.count(symbol) == count
         assert f"{symbol} {CLASSES.by_symbol(symbol).title} ({count})" in shown
-    assert {"N", "10 m", "A place", "2.300000°, 48.800000° · error 12.0 m"} <= set(shown)
+    assert {"N", "10 m", "A place", "48.800000°, 2.300000° · error 12.0 m"} <= set(shown)
     assert (example.types or "Nothing is seen") in picture.description
     # The object that is not visible is in the legend, without a count.
     assert ("D Street light" in shown) == ("D" not in example.types)
@@ -143,10 +143,10 @@ def test_answer_is_a_cross_or_an_arrow_with_its_distance() -> None:
 
 def test_error_text_of_unlocalized_queries_and_of_scenes_without_query() -> None:
     unlocalized = draw_scene(scene(error_m=float("inf")))
-    assert "2.300000°, 48.800000° · not localized" in texts(unlocalized.svg)
+    assert "48.800000°, 2.300000° · not localized" in texts(unlocalized.svg)
     assert unlocalized.description.endswith("Not localized.")
     picture = draw_scene(scene(error_m=None))
-    assert "2.300000°, 48.800000°" in texts(picture.svg)
+    assert "48.800000°, 2.300000°" in texts(picture.svg)
     assert "rror" not in picture.description
 
 
