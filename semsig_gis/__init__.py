@@ -4,12 +4,10 @@ The most used names are imported from here, the others from their package, such 
 `semsig_gis.localization`.
 The road in one glance::
 
-    catalog = load_catalog("montpellier")
-    layers, absent = read_files(choose_layers(catalog), ["montpellier/"])
-    objects = assemble(layers, catalog).objects
-    database = build_database(objects)
-    query = Signature.parse("DDBB", [10, 80, 200, 310], taxonomy=database.taxonomy)
-    localize(database, query).candidates
+    loaded = load("monaco.osm.pbf")
+    city = build(loaded, "monaco.parquet")
+    answer = localize(city, "bench at 40, tree at 120")
+    answer.latlon, answer.chance, answer.place
 """
 
 import importlib
@@ -73,6 +71,23 @@ def _public(name: str) -> object:
 
 _register_loader(_public)
 
+_PACKAGES = (
+    *("core", "sources", "objects", "observation", "database", "localization"),
+    *("evaluation", "output"),
+)
+"""The packages that users may import from."""
+
+
+def _advice(name: str) -> str:
+    """Return what to write instead of a name that is not public here."""
+    from semsig_gis.core import nearest_name  # noqa: PLC0415 - rarely needed
+
+    lacks = f"semsig_gis has no name {name!r}"
+    for package in _PACKAGES if not name.startswith("_") else ():
+        if name in importlib.import_module(f"semsig_gis.{package}").__all__:
+            return f"{lacks}; import it from semsig_gis.{package}."
+    return f"{lacks}{nearest_name(name, __all__)}."
+
 
 def __getattr__(name: str) -> object:
     """Return a public name; one that was renamed or moved, with a warning."""
@@ -82,8 +97,12 @@ def __getattr__(name: str) -> object:
     elif name in _MOVED:
         new, end = name, _MOVED_END
         change = f"is imported from semsig_gis.{_MOVED[name]} now"
-    else:
+    elif name in _PACKAGES:
+        return importlib.import_module(f"{__name__}.{name}")
+    elif name in __all__:
         return _attached(name)
+    else:
+        raise AttributeError(_advice(name), name=name, obj=None)
     warnings.warn(
         f"semsig_gis.{name} {change}; version {end} removes the old name.",
         DeprecationWarning,

@@ -48,6 +48,7 @@ from .database import (
     ObjectStore as ObjectStore,
     SignatureDatabase as SignatureDatabase,
     ViewpointSpec as ViewpointSpec,
+    build as build,
     build_database as build_database,
     merge_databases as merge_databases,
     open_city as open_city,

@@ -262,6 +262,6 @@ class Load(LoadOptions):
                 merge=self.merge,
                 max_distortion=self.max_distortion,
                 progress=advance,
-                tell=reporter.remark,
+                remark=reporter.remark,
             )
         return self.save(loaded)

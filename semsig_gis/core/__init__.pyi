@@ -92,6 +92,7 @@ from .plugins import installed_command_names as installed_command_names
 from .plugins import installed_commands as installed_commands
 from .plugins import installed_outputs as installed_outputs
 from .plugins import installed_readers as installed_readers
+from .presentation import export_with as export_with
 from .presentation import map_with as map_with
 from .presentation import plot_with as plot_with
 from .presentation import register_loader as register_loader

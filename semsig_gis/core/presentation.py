@@ -1,7 +1,7 @@
-"""Calls of public plot and map functions by name, for the methods `plot` and `explore` of results.
+"""Calls of public functions by name, for the methods `plot`, `explore` and `export` of results.
 
-The packages that draw import the packages of the results, so a result cannot import them. The root
-package `semsig_gis`, which lists all public names, registers here a function that loads one.
+The packages that draw and write import the packages of the results, so a result cannot import them.
+The root package `semsig_gis` lists all public names, and registers here a function that loads one.
 """
 
 from __future__ import annotations
@@ -23,6 +23,11 @@ def register_loader(load: Callable[[str], Any]) -> None:
 
 def plot_with(name: str, *results: object, **options: Any) -> Axes:  # noqa: ANN401 - as it takes
     """Return the axes on which the public function `name` draws results."""
+    return _loaders[0](name)(*results, **options)
+
+
+def export_with(name: str, *results: object, **options: Any) -> Any:  # noqa: ANN401 - as it takes
+    """Write results by the public function `name`, and return what it returns."""
     return _loaders[0](name)(*results, **options)
 
 

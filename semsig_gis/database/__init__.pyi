@@ -1,10 +1,12 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
-from .build import build_cells as build_cells
-from .build import build_database as build_database
-from .build import sightings_by_block as sightings_by_block
+from .cells import build as build
+from .cells import build_cells as build_cells
+from .cells import build_database as build_database
+from .cells import sightings_by_block as sightings_by_block
 from .city import City as City
 from .city import open_city as open_city
+from .city import whole_database as whole_database
 from .companion_files import Companion as Companion
 from .companion_files import companions as companions
 from .companion_files import remove_companions as remove_companions

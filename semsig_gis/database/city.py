@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core import DatabaseError, Displayed
+from semsig_gis.core import DatabaseError, Displayed, export_with
 from semsig_gis.database.file import (
     INPUTS,
     KIND,
@@ -39,9 +39,11 @@ from semsig_gis.storage import read_geoparquet, whole_folder, write_geoparquet
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
+    import geopandas as gpd
+    from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Axes, MapFrame
+    from semsig_gis.database.database import CellGeometry, SignatureDatabase
     from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.store import ObjectStore
     from semsig_gis.objects import StreetObjects
@@ -55,14 +57,14 @@ _Value = TypeVar("_Value")
 
 
 class City(Displayed):
-    """A signature database with its object store and added columns, made by `open_city`.
+    """A signature database with its object store and added columns, by `open_city` or `build`.
 
-    Each of them is read at the first access.
+    Each of them is read at the first access; the database keeps what questions compute from it.
 
     Parameters
     ----------
-    path : str or Path
-        File of the database, or folder of its parts.
+    path : str or Path, optional
+        File of the database, or folder of its parts; None for a city only in memory.
 
     Examples
     --------
@@ -75,12 +77,28 @@ class City(Displayed):
     True
     """
 
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+    def __init__(self, path: str | Path | None = None) -> None:
+        self._path = None if path is None else Path(path)
         self._read_state: tuple[int, ...] | None = None
 
     def _facts(self) -> dict[str, object]:
-        return {"file": self.path}
+        file = "none, in memory" if self._path is None else self._path
+        is_read = "database" in vars(self)
+        return {"file": file, **({"cells": len(self.database)} if is_read else {})}
+
+    @property
+    def path(self) -> Path:
+        """The file or folder; DatabaseError if the city is only in memory."""
+        if self._path is None:
+            raise DatabaseError(
+                "the city is only in memory; give `build` a file to write, or write it with "
+                "save_with_store(city.database, city.store, 'city.parquet')."
+            )
+        return self._path
+
+    @property
+    def _in_parts(self) -> bool:
+        return self._path is not None and self._path.is_dir()
 
     @cached_property
     def database(self) -> SignatureDatabase:
@@ -90,7 +108,7 @@ class City(Displayed):
     @cached_property
     def dataset(self) -> SignatureDatabase | PartitionedDatabase:
         """The database; if it is in parts, without reading them all (see `open_dataset`)."""
-        return open_dataset(self.path) if self.path.is_dir() else self.database
+        return open_dataset(self.path) if self._in_parts else self.database
 
     @property
     def licenses(self) -> tuple[str, ...]:
@@ -125,7 +143,7 @@ class City(Displayed):
     @property
     def has_store(self) -> bool:
         """Whether the database has an object store."""
-        return self.store_path.is_dir()
+        return "store" in vars(self) or self.store_path.is_dir()
 
     @cached_property
     def store(self) -> ObjectStore:
@@ -158,7 +176,7 @@ class City(Displayed):
         Of a database in parts, only what is near the place is read.
         """
         try:
-            if self.path.is_dir() and "store" not in vars(self):
+            if self._in_parts and "store" not in vars(self):
                 return names_around(self.path, (x, y)).of(x, y)
             return self.store.place_name(x, y)
         except DatabaseError:
@@ -172,13 +190,37 @@ class City(Displayed):
     @property
     def has_columns(self) -> bool:
         """Whether columns were added to the file or a part."""
-        return any(read_specs(file).get(ADDED) for file in self.files)
+        return self._path is not None and any(read_specs(file).get(ADDED) for file in self.files)
+
+    def to_geodataframe(self, *, geometry: CellGeometry = "polygon") -> gpd.GeoDataFrame:
+        """Return the cells as a table (see `SignatureDatabase.to_geodataframe`)."""
+        return self.database.to_geodataframe(geometry=geometry)
+
+    def plot(
+        self,
+        column: str | ArrayLike | None = None,
+        *,
+        ax: Axes | None = None,
+        **look: Any,  # noqa: ANN401 - options of matplotlib
+    ) -> Axes:
+        """Draw the cells (see `plot_database`)."""
+        return self.database.plot(column, ax=ax, **look)
+
+    def explore(self) -> MapFrame:
+        """Show the cells on a map in a notebook, by the number of cells with equal signatures."""
+        return self.database.explore()
+
+    def export(self, path: str | Path) -> None:
+        """Write the cells and the street objects in the format of a suffix (`export_database`)."""
+        export_with("export_database", self.database, path, objects=self.objects)
 
     def columns(self, name: str) -> tuple[pa.Table, dict[str, Any]] | None:
         """Return the columns that were added to the database under a name, and their facts.
 
         The table has ``cell_id``, ascending, and the columns. DatabaseError if the parts differ.
         """
+        if self._path is None:
+            return None
         files = self.files
         entries = [read_specs(file).get(ADDED, {}).get(name) for file in files]
         if not any(entries):
@@ -216,6 +258,11 @@ class City(Displayed):
             Manifest(manifest.recipe, tuple(parts)).write(partial)
             if self.has_store:
                 shutil.copytree(self.store_path, partial / INPUTS)
+
+
+def whole_database(cells: SignatureDatabase | City) -> SignatureDatabase:
+    """Return the database of a city, or a database as it is."""
+    return cells.database if isinstance(cells, City) else cells
 
 
 def open_city(path: str | Path) -> City:

@@ -230,7 +230,7 @@ class SignatureDatabase(Displayed):
         return read_only(self.angle_sequences.counts[self.angle_sequences.inverse])
 
     @cached_property
-    def kept(self) -> list[Any]:
+    def memo(self) -> list[Any]:
         """What other packages computed from the database and keep with it, such as an index."""
         return []
 

@@ -20,7 +20,7 @@ from semsig_gis.core import (
     Displayed,
     cells_near,
 )
-from semsig_gis.database.build import build_cells
+from semsig_gis.database.cells import build_cells
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import join_databases, require_same
 from semsig_gis.database.occlusion import MARGIN_M, footprints_around

@@ -36,7 +36,7 @@ from semsig_gis.core import (
     require_step,
     split_ids,
 )
-from semsig_gis.database.build import (
+from semsig_gis.database.cells import (
     HIDDEN_PAIR_S,
     PAIR_S,
     build_cells,

@@ -27,7 +27,7 @@ from semsig_gis.core import (
     percent,
     split_ids,
 )
-from semsig_gis.database.build import build_cells
+from semsig_gis.database.cells import build_cells
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
 from semsig_gis.database.file import (

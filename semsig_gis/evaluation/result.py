@@ -13,7 +13,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from semsig_gis.core import Displayed, InputError, map_with, percent, plot_with
-from semsig_gis.database import rows_of_result
+from semsig_gis.database import rows_of_result, whole_database
 from semsig_gis.evaluation.figures import (
     AMBIGUITIES,
     ELSEWHERE,
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import Axes, MapFrame
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database import City, SignatureDatabase
     from semsig_gis.evaluation.queries.draw import QuerySpec
     from semsig_gis.localization import AnyMethod
 
@@ -235,9 +235,9 @@ class Evaluation(Displayed):
         """Draw the curve of errors or of recall, or a map of failures (`plot_evaluation`)."""
         return plot_with("plot_evaluation", self, kind, ax=ax, label=label)
 
-    def explore(self, database: SignatureDatabase) -> MapFrame:
+    def explore(self, database: SignatureDatabase | City) -> MapFrame:
         """Show the queries on a map in a notebook (see `evaluation_map`)."""
-        return map_with("evaluation_map", self, database)
+        return map_with("evaluation_map", self, whole_database(database))
 
     @property
     def query_bearings(self) -> list[list[float]]:

@@ -25,6 +25,7 @@ from semsig_gis.core import (
     cell_ids,
     wrap_degrees,
 )
+from semsig_gis.database import whole_database
 from semsig_gis.evaluation.figures import LENGTHS, range_labels
 from semsig_gis.evaluation.queries.distortion_text import QueryDistortion, parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count, draw_queries
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database import City, SignatureDatabase
     from semsig_gis.evaluation.queries.draw import SimulatedQuery
     from semsig_gis.localization import (
         Answer,
@@ -77,7 +78,7 @@ OUTCOME_COLUMNS = (
 
 
 def evaluate(
-    database: SignatureDatabase,
+    database: SignatureDatabase | City,
     *,
     queries: int = 500,
     method: str | Method | LikelihoodIndex = DEFAULT_METHOD,
@@ -87,11 +88,11 @@ def evaluate(
     surely_here: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
-    """SimulatedQuery a database with distorted signatures of its own cells and score the answers.
+    """Search a database for distorted signatures of its own cells, and score the answers.
 
     Parameters
     ----------
-    database : SignatureDatabase
+    database : SignatureDatabase or City
         The database to search.
     queries : int, default 500
         Number of cells to draw as queries, without replacement; 1 to the number of cells.
@@ -139,6 +140,7 @@ def evaluate(
     >>> len(evaluation.queries), evaluation.recall(100)
     (20, 1.0)
     """
+    database = whole_database(database)
     check_count("queries", queries, len(database))
     check_count("candidates", top, len(database))
     if isinstance(distortion, str):

@@ -24,7 +24,7 @@ from semsig_gis.database import City, PartitionedDatabase, join_databases, open_
 from semsig_gis.localization.answers import Answer
 from semsig_gis.localization.noise.model import cell_noise
 from semsig_gis.localization.noise.presets import NOISES
-from semsig_gis.observation import GRID_NORTH, View, read_seen
+from semsig_gis.observation import GRID_NORTH, View, read_description
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.method import LikelihoodMethod
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.requirement import Requirement
-    from semsig_gis.observation import AnySeen, North
+    from semsig_gis.observation import AnyView, North
 
     Cells: TypeAlias = SignatureDatabase | PartitionedDatabase | City
     Where: TypeAlias = str | Path | Cells
@@ -237,18 +237,18 @@ def method_index(database: SignatureDatabase, method: LikelihoodMethod) -> Likel
     from semsig_gis.localization.likelihood.index import build_index  # noqa: PLC0415 - above
 
     noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
-    kept: list[LikelihoodIndex] = database.kept
-    for index in kept:
+    indexes: list[LikelihoodIndex] = database.memo
+    for index in indexes:
         if index.noise == noise:
             return index
-    kept[:] = [*kept[1 - KEPT_INDEXES :], build_index(database, noise)]
-    return kept[-1]
+    indexes[:] = [*indexes[1 - KEPT_INDEXES :], build_index(database, noise)]
+    return indexes[-1]
 
 
 @overload
 def localize(
     where: Where,
-    seen: AnySeen,
+    view: AnyView,
     *,
     method: LikelihoodMethod | Literal["likelihood"] = DEFAULT_METHOD,
     requirement: Requirement | None = None,
@@ -259,7 +259,7 @@ def localize(
 @overload
 def localize(
     where: Where,
-    seen: AnySeen,
+    view: AnyView,
     *,
     method: Method,
     requirement: Requirement | None = None,
@@ -269,7 +269,7 @@ def localize(
 @overload
 def localize(
     where: Where,
-    seen: AnySeen,
+    view: AnyView,
     *,
     method: str,
     requirement: Requirement | None = None,
@@ -279,7 +279,7 @@ def localize(
 ) -> Location | Localization: ...
 def localize(
     where: Where,
-    seen: AnySeen,
+    view: AnyView,
     *,
     method: str | AnyMethod = DEFAULT_METHOD,
     requirement: Requirement | None = None,
@@ -295,7 +295,7 @@ def localize(
         The cells: the file or folder of a database, or one that is open, which is faster from the
         second question on. A distance reads a partitioned database one part at a time. The
         likelihood method also searches between the centres of cells if there are street objects.
-    seen : str, iterable, dict or Signature
+    view : str, iterable, dict or Signature
         What a person or a detector saw: a sentence, a list of pairs of class and bearing, a row as
         `parse_view` takes it, or a view. Objects of a class that no cell sees are not used, with a
         note in the answer.
@@ -346,13 +346,13 @@ def localize(
     'types+angles'
     """
     settings: dict[str, Any] = {"requirement": requirement, "top": top, "north": north, **options}
-    (answer,) = localize_many(where, [seen], method=method, **settings)
+    (answer,) = localize_many(where, [view], method=method, **settings)
     return cast("Location | Localization", answer)
 
 
 def localize_many(
     where: Where,
-    views: Iterable[AnySeen],
+    views: Iterable[AnyView],
     *,
     method: str | AnyMethod = DEFAULT_METHOD,
     requirement: Requirement | None = None,
@@ -384,31 +384,31 @@ def localize_many(
     cells = open_city(where) if isinstance(where, str | Path) else where
     dataset = cells.dataset if isinstance(cells, City) else cells
     usual = method == LIKELIHOOD
-    given = parse_method(method) if isinstance(method, str) else method
-    if options and given.noise is None:
+    ranking = parse_method(method) if isinstance(method, str) else method
+    if options and ranking.noise is None:
         raise InputError(
             f"{' and '.join(options)} {'works' if len(options) == 1 else 'work'} only with the "
-            f"likelihood method, not with {str(given)!r}; leave out one or the other."
+            f"likelihood method, not with {str(ranking)!r}; leave out one or the other."
         )
 
     @cache
     def locator_for(noise: str) -> Any:  # noqa: ANN401 - a locator of either kind
-        own = parse_method(f"{LIKELIHOOD}:{noise}") if noise else given
-        return make_locator(
-            cells, own, requirement=requirement, **{"top": top, "north": north, **options}
-        )
+        own = parse_method(f"{LIKELIHOOD}:{noise}") if noise else ranking
+        settings: LocateOptions = {"top": top, "north": north, **options}
+        return make_locator(cells, own, requirement=requirement, **settings)
 
-    def answer(item: AnySeen) -> Location | Localization:
-        seen = read_seen(item, taxonomy=dataset.taxonomy, radius=dataset.spec.radius)
-        noise = ("by-hand" if seen.in_words else usual_noise(seen.view)) if usual else ""
-        locator = locator_for(noise)
-        if seen.unplaced or seen.absent:
+    def answer(item: AnyView) -> Location | Localization:
+        description = read_description(item, taxonomy=dataset.taxonomy, radius=dataset.spec.radius)
+        noise = "by-hand" if description.in_words else usual_noise(description.view)
+        locator = locator_for(noise if usual else "")
+        unplaced, absent = description.unplaced, description.absent
+        if unplaced or absent:
             from semsig_gis.localization.suggest import with_unplaced  # noqa: PLC0415 - geopandas
 
-            locator = with_unplaced(locator, seen.view, seen.unplaced, absent=seen.absent)
-        has_bearings = seen.view.bearings is not None  # which explanations need
-        if given.noise is not None and "explained" not in options and has_bearings:
+            locator = with_unplaced(locator, description.view, unplaced, absent=absent)
+        has_bearings = description.view.bearings is not None  # which explanations need
+        if ranking.noise is not None and "explained" not in options and has_bearings:
             locator = replace(locator, explained=1)
-        return cast("Location | Localization", locator.locate(seen.view))
+        return cast("Location | Localization", locator.locate(description.view))
 
     return each_in_order(answer, views)

@@ -48,7 +48,7 @@ def load(
     merge: bool = True,
     max_distortion: float = MAX_DISTORTION,
     progress: Callable[[int, int], None] | None = None,
-    tell: Callable[[str], None] | None = None,
+    remark: Callable[[str], None] | None = None,
 ) -> Loaded:
     """Load street objects, buildings and streets from files, as `semsig load` does.
 
@@ -77,8 +77,8 @@ def load(
         As in `assemble`.
     progress : callable, optional
         Called with the number of files read and the total.
-    tell : callable, optional
-        Called with a sentence on each file whose catalogue was found by its contents.
+    remark : callable, optional
+        Called with a sentence on each file with a catalogue that was found by its contents.
 
     Returns
     -------
@@ -115,8 +115,9 @@ def load(
     if not several:
         names, lines = detect_catalogs(paths)
         several = list(names)
-        for line in lines if tell is not None else ():
-            tell(line)
+        if remark is not None:
+            for line in lines:
+                remark(line)
     merged = combine_catalogs(
         [item if isinstance(item, Catalog) else load_catalog(item) for item in several]
     )

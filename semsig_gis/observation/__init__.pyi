@@ -1,5 +1,8 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
+from .description import AnyView as AnyView
+from .description import Description as Description
+from .description import read_description as read_description
 from .detectors.camera import POSSIBLE_FOV as POSSIBLE_FOV
 from .detectors.camera import USUAL_FOV as USUAL_FOV
 from .detectors.camera import Camera as Camera
@@ -36,9 +39,6 @@ from .north import GRID_NORTH as GRID_NORTH
 from .north import North as North
 from .north import NorthRecord as NorthRecord
 from .north import declination as declination
-from .seen import AnySeen as AnySeen
-from .seen import Seen as Seen
-from .seen import read_seen as read_seen
 from .sentences import GUESS_ERROR as GUESS_ERROR
 from .sentences import RADIUS_M as RADIUS_M
 from .sentences import SEEN as SEEN

@@ -36,8 +36,8 @@ from semsig_gis.database import (
     SightingPairs,
     ViewpointSpec,
     bearings,
-    build,
     build_database,
+    cells,
     sightings_by_block,
 )
 
@@ -50,14 +50,14 @@ GRID = GridSpec(2.0, (-1.0, -1.0))
 
 
 def look(
-    cells: list[tuple[int, int]] | NDArray[np.int64],
+    numbers: list[tuple[int, int]] | NDArray[np.int64],
     places: object,
     ranges: float | NDArray[np.float64] = 30.0,
     grid: GridSpec = GRID,
 ) -> SightingPairs:
     """Return all sightings, ordered by cell and object."""
     objects = np.asarray(places, dtype=float)
-    columns, rows = np.asarray(cells).reshape(-1, 2).T
+    columns, rows = np.asarray(numbers).reshape(-1, 2).T
     index, reach = PackedIndex(objects), np.broadcast_to(np.float64(ranges), len(objects))
     end, parts = 0, [SightingPairs(*(np.empty(0, kind) for kind in (int, int, float, float)))]
     for block, pairs in sightings_by_block(
@@ -67,7 +67,7 @@ def look(
         end = block.stop
         size = block.stop - block.start
         assert ((pairs.viewpoint >= 0) & (pairs.viewpoint < size)).all()
-        assert len(pairs.object) <= build.PAIRS_PER_BLOCK or size == 1
+        assert len(pairs.object) <= cells.PAIRS_PER_BLOCK or size == 1
         viewpoint = pairs.viewpoint + block.start
         parts.append(SightingPairs(viewpoint, pairs.object, pairs.bearing, pairs.distance))
     assert end == len(columns)
@@ -140,8 +140,8 @@ def test_sightings_equal_measuring_every_pair(
     near = np.stack(cells_near(objects, grid=grid, radius=radius), axis=-1)
     rows = np.flatnonzero(rng.random(len(near)) < max(share, 5 / len(near)))[:3000]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(build, "CELLS_PER_BLOCK", blocks[0])
-        patch.setattr(build, "PAIRS_PER_BLOCK", blocks[1])
+        patch.setattr(cells, "CELLS_PER_BLOCK", blocks[0])
+        patch.setattr(cells, "PAIRS_PER_BLOCK", blocks[1])
         result = look(near[rows], objects, ranges, grid)
     assert_equal(result, slow_look(near[rows], objects, ranges, grid))
 
@@ -176,7 +176,7 @@ def test_block_size_does_not_change_the_database(
 ) -> None:
     whole = town.database
     calls: list[tuple[int, int]] = []
-    monkeypatch.setattr(build, "CELLS_PER_BLOCK", size)
+    monkeypatch.setattr(cells, "CELLS_PER_BLOCK", size)
     parts = build_database(town.street_objects, progress=lambda *call: calls.append(call))
     assert_same(parts, whole)
     total = calls[-1][1]
@@ -246,9 +246,9 @@ def test_expected_number_of_pairs_is_near_the_actual_one(
     objects, grid = town.street_objects, GridSpec(step)
     database = build_database(objects, grid=grid, spec=SignatureSpec(radius))
     ranges = objects.taxonomy.ranges(radius)[objects.codes]
-    expected = build.expected_pairs(ranges, grid=grid, cells=10**9)
+    expected = cells.expected_pairs(ranges, grid=grid, cells=10**9)
     assert expected == pytest.approx(len(database.codes), rel=0.05)
-    assert build.expected_pairs(ranges, grid=grid, cells=3) == 3 * len(objects)
+    assert cells.expected_pairs(ranges, grid=grid, cells=3) == 3 * len(objects)
 
 
 def test_a_build_that_exceeds_memory_is_refused(
@@ -261,4 +261,4 @@ def test_a_build_that_exceeds_memory_is_refused(
     with refused(InputError, "cells of 6.5 m within 6000 m", "free"):
         build_database(town.street_objects, grid=GridSpec(6.5), spec=SignatureSpec(6000.0))
     with refused(InputError, "more than the 2,147,483,647 that one file can contain"):
-        build.require_room(3e9, cells=10, objects=10**6)
+        cells.require_room(3e9, cells=10, objects=10**6)

@@ -71,16 +71,16 @@ DETECTIONS = [{"class": name, "bearing": bearing} for name, bearing in PAIRS]
 
 def test_every_form_of_a_view_gives_the_same_answer(tmp_path: Path) -> None:
     path = save_town(tmp_path, TOWN)
-    view = parse_view({"see": SENTENCE}, taxonomy=CITY.taxonomy)
-    by_hand = localize(open_city(path), view, method="likelihood:by-hand").to_dict()
+    parsed = parse_view({"see": SENTENCE}, taxonomy=CITY.taxonomy)
+    by_hand = localize(open_city(path), parsed, method="likelihood:by-hand").to_dict()
     for where in (path, str(path), open_city(path)):
-        for seen in (SENTENCE, PAIRS, {"see": SENTENCE}):
-            assert localize(where, seen).to_dict() == by_hand
+        for view in (SENTENCE, PAIRS, {"see": SENTENCE}):
+            assert localize(where, view).to_dict() == by_hand
     # Rows are those of a detector.
-    generic = localize(path, view).to_dict()
+    generic = localize(path, parsed).to_dict()
     assert generic["noise"] == "generic"
-    for seen in (DETECTIONS, {"detections": DETECTIONS}):
-        assert localize(path, seen).to_dict() == generic
+    for view in (DETECTIONS, {"detections": DETECTIONS}):
+        assert localize(path, view).to_dict() == generic
 
 
 def test_class_names_and_ranges_need_no_bearings() -> None:
@@ -93,10 +93,10 @@ def test_class_names_and_ranges_need_no_bearings() -> None:
 
 
 def test_absent_and_undirected_objects_are_used() -> None:
-    known = localize(CITY, f"{SENTENCE}, bus stop, no fountain").to_dict()["prior"]
-    assert known is not None
-    assert known["seen"] == ["bus stop"]
-    assert len(known["absent"]) == 1
+    prior = localize(CITY, f"{SENTENCE}, bus stop, no fountain").to_dict()["prior"]
+    assert prior is not None
+    assert prior["seen"] == ["bus stop"]
+    assert len(prior["absent"]) == 1
     with refused(InputError, "edit", "directions"):
         localize(CITY, f"{SENTENCE}, bus stop", method=PAPER_METHOD)
 
@@ -144,7 +144,7 @@ def test_many_questions_are_answered_in_order() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seen", "parts"),
+    ("view", "parts"),
     [
         ("  ", ("empty", "sentence")),
         (7, ("type int", "sentence")),
@@ -153,9 +153,9 @@ def test_many_questions_are_answered_in_order() -> None:
         ({"seen": "bench at 40"}, ("keys seen", "nearest is 'see'")),
     ],
 )
-def test_other_forms_of_a_view_are_refused(seen: Any, parts: tuple[str, ...]) -> None:  # noqa: ANN401 - any value of a user
+def test_other_forms_of_a_view_are_refused(view: Any, parts: tuple[str, ...]) -> None:  # noqa: ANN401 - any value of a user
     with refused(InputError, *parts):
-        localize(CITY, seen)
+        localize(CITY, view)
 
 
 def test_options_of_the_likelihood_are_refused_for_a_distance() -> None:

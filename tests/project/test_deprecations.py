@@ -47,3 +47,13 @@ def test_old_names_are_not_listed() -> None:
 @pytest.mark.parametrize("end", [MOVED_END, *(end for _, end in RENAMED.values())])
 def test_old_names_are_removed_in_their_version(end: str) -> None:
     assert Version(semsig_gis.__version__) < Version(end)
+
+
+def test_a_wrong_name_is_refused_with_the_nearest_or_its_package() -> None:
+    for wrong, right in (("localise", "localize"), ("optn_city", "open_city")):
+        with pytest.raises(AttributeError, match=f"no name '{wrong}'; the nearest is '{right}'"):
+            getattr(semsig_gis, wrong)
+    with pytest.raises(AttributeError, match=r"import it from semsig_gis\.database\."):
+        getattr(semsig_gis, "TilePlan")  # noqa: B009 - mypy knows that there is none
+    assert not hasattr(semsig_gis, "_ipython_display_")
+    assert semsig_gis.localization is importlib.import_module("semsig_gis.localization")

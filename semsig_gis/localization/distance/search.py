@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core import EmptyResultError, map_with
-from semsig_gis.database import PartitionedDatabase, join_databases, rows_of_result
+from semsig_gis.database import (
+    PartitionedDatabase,
+    join_databases,
+    rows_of_result,
+    whole_database,
+)
 from semsig_gis.localization.answers import (
     Answer,
     AnswerRecord,
@@ -32,7 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import MapFrame, Signature
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database import City, SignatureDatabase
     from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.distance.method import Method
     from semsig_gis.localization.requirement import Requirement
@@ -119,9 +124,9 @@ class Localization(Answer):
         ids, types = self.columns["cell_id"], self.columns["types"]
         return rows_of_result(database, ids, types, what="localization")
 
-    def explore(self, database: SignatureDatabase) -> MapFrame:
+    def explore(self, database: SignatureDatabase | City) -> MapFrame:
         """Return a map of the candidates for a notebook (see `localization_map`)."""
-        return map_with("localization_map", self, database)
+        return map_with("localization_map", self, whole_database(database))
 
     def to_dict(self) -> LocalizationRecord:
         """Return plain values for JSON; ``candidates`` is a list of records.

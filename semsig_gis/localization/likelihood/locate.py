@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
-from semsig_gis.core import InputError, cell_ids, map_with, percent, to_degrees
+from semsig_gis.core import InputError, cell_ids, export_with, map_with, percent, to_degrees
 from semsig_gis.localization.answers import (
     LEAST_ELSEWHERE,
     REGION_SHARE,
@@ -53,6 +53,7 @@ from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     import pandas as pd
     from numpy.typing import NDArray
@@ -256,8 +257,9 @@ class Location(Answer):
         def described(name: str | None, bearing: float | None, metres: float | None) -> str:
             if name is None:
                 return ""
-            known = name != UNKNOWN_NAME
-            title = self.taxonomy.by_name(name).title.lower() if known else "something"
+            title = "something"
+            if name != UNKNOWN_NAME:
+                title = self.taxonomy.by_name(name).title.lower()
             at = "" if bearing is None else f" at {bearing:.0f}°"
             return f"{title}{at}" + ("" if metres is None else f", {metres:.0f} m")
 
@@ -289,6 +291,10 @@ class Location(Answer):
     def explore(self) -> MapFrame:
         """Show the answer on a map in a notebook (see `location_map`)."""
         return map_with("location_map", self)
+
+    def export(self, path: str | Path) -> None:
+        """Write the regions to search, the candidates and the place (see `export_answer`)."""
+        export_with("export_answer", self, self.posterior.database, path)
 
     def to_dict(self) -> LocationRecord:
         """Return everything except the chances of all cells as plain values for JSON.

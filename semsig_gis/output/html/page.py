@@ -177,10 +177,19 @@ def _data_uri(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class MapFrame:
-    """The page of a map in a frame of ``height`` pixels, for notebooks and the documentation."""
+    """A map in a frame of ``height`` pixels, for notebooks and the documentation."""
 
-    page: str = field(repr=False)
+    map: folium.Map = field(repr=False)
     height: int
+
+    @property
+    def page(self) -> str:
+        """The page of the map as `save_map` writes it by default."""
+        return page_of_map(self.map)
+
+    def save(self, path: str | Path, *, title: str | None = None) -> None:
+        """Write the map as one HTML page (see `save_map`)."""
+        save_map(self.map, path, title=title)
 
     def _repr_html_(self) -> str:
         """Return the page in a frame, which isolates its scripts from the notebook."""
@@ -231,7 +240,7 @@ def show_map(map_: folium.Map, *, height: int = 520) -> MapFrame:
     >>> show_map(folium.Map(tiles=None), height=300).height
     300
     """
-    return MapFrame(page_of_map(map_), height)
+    return MapFrame(map_, height)
 
 
 def save_map(

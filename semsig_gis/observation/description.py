@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from semsig_gis.core import Taxonomy
     from semsig_gis.storage import Row
 
-AnySeen: TypeAlias = "str | Signature | Row | Iterable[str | Row | tuple[object, ...]]"
-"""What was seen, in a form that `read_seen` takes."""
+AnyView: TypeAlias = "str | Signature | Row | Iterable[str | Row | tuple[object, ...]]"
+"""What was seen, in a form that `read_description` takes."""
 
 DETECTION = ("class", "bearing", "range")
 FORMS = (
@@ -33,7 +33,7 @@ FORMS = (
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
-class Seen:
+class Description:
     """A view, and what else is known of it.
 
     `unplaced` and `absent` are the class codes of objects that were seen in an unknown direction,
@@ -46,12 +46,12 @@ class Seen:
     in_words: bool = False
 
 
-def read_seen(seen: AnySeen, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Seen:
+def read_description(view: AnyView, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Description:
     """Read what was seen; InputError if it has another form, UnknownNameError for other classes.
 
     Parameters
     ----------
-    seen : str, iterable, dict or Signature
+    view : str, iterable, dict or Signature
         A sentence; a list of class names, or of pairs of a name and a bearing in degrees, perhaps
         with a distance; a row as `parse_view` takes it; or a view.
     taxonomy : Taxonomy
@@ -61,28 +61,29 @@ def read_seen(seen: AnySeen, *, taxonomy: Taxonomy, radius: float = RADIUS_M) ->
 
     Returns
     -------
-    Seen
-        The view.
+    Description
+        The view, and what else is known of it.
 
     Examples
     --------
     >>> from semsig_gis import paper_taxonomy
-    >>> from semsig_gis.observation import read_seen
-    >>> seen = read_seen("bench at 40, lamp at 80, no bus stop", taxonomy=paper_taxonomy())
-    >>> seen.view.bearings.tolist(), seen.absent
+    >>> from semsig_gis.observation import read_description
+    >>> sentence = "bench at 40, lamp at 80, no bus stop"
+    >>> description = read_description(sentence, taxonomy=paper_taxonomy())
+    >>> description.view.bearings.tolist(), description.absent
     ([40.0, 80.0], (11,))
     >>> pairs = [("bench", 40), ("lamp", 80)]
-    >>> read_seen(pairs, taxonomy=paper_taxonomy()).view.codes.tolist()
+    >>> read_description(pairs, taxonomy=paper_taxonomy()).view.codes.tolist()
     [10, 3]
     """
-    if isinstance(seen, Signature):
-        return Seen(view=seen)
-    if isinstance(seen, str):
-        if not seen.strip():
+    if isinstance(view, Signature):
+        return Description(view=view)
+    if isinstance(view, str):
+        if not view.strip():
             raise InputError(f"the text of what was seen is empty; {FORMS}.")
-        row, in_words = text_row(seen, taxonomy), True
-    elif isinstance(seen, Mapping):
-        row, in_words = dict(seen), "see" in seen
+        row, in_words = text_row(view, taxonomy), True
+    elif isinstance(view, Mapping):
+        row, in_words = dict(view), "see" in view
         if all(row.get(name) is None for name in SEEN):
             near = nearest_name(next(map(str, row), ""), SEEN)
             raise InputError(
@@ -90,22 +91,24 @@ def read_seen(seen: AnySeen, *, taxonomy: Taxonomy, radius: float = RADIUS_M) ->
                 f"seen{near}; give {', '.join(SEEN[:-1])} or {SEEN[-1]}."
             )
     else:
-        items = _items(seen)
+        items = _items(view)
         row = {"detections": [_detection(item) for item in items]}
         in_words = not any(isinstance(item, Mapping) for item in items)
     sentence = row_value(row, "see")
     if sentence is None:
-        return Seen(view=parse_view(row, taxonomy=taxonomy, radius=radius), in_words=in_words)
+        return Description(
+            view=parse_view(row, taxonomy=taxonomy, radius=radius), in_words=in_words
+        )
     placed, unplaced, absent = unplaced_codes(str(sentence), taxonomy)
-    view = parse_view({**row, "see": placed}, taxonomy=taxonomy, radius=radius)
-    return Seen(view=view, unplaced=unplaced, absent=absent, in_words=in_words)
+    parsed = parse_view({**row, "see": placed}, taxonomy=taxonomy, radius=radius)
+    return Description(view=parsed, unplaced=unplaced, absent=absent, in_words=in_words)
 
 
-def _items(seen: Any) -> list[Any]:  # noqa: ANN401 - any value of a user
+def _items(view: Any) -> list[Any]:  # noqa: ANN401 - any value of a user
     try:
-        return list(seen)
+        return list(view)
     except TypeError as error:
-        raise InputError(f"what was seen is of type {type(seen).__name__}; {FORMS}.") from error
+        raise InputError(f"what was seen is of type {type(view).__name__}; {FORMS}.") from error
 
 
 def _detection(item: Any) -> Row:  # noqa: ANN401 - any value of a user

@@ -23,24 +23,28 @@ from semsig_gis.core import (
     require_memory,
     split_ids,
 )
+from semsig_gis.database.city import City
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.sightings import clockwise_order, measure_sightings
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.viewpoints import (
     ViewpointSpec,
     choose_viewpoints,
     reproject,
     select_elements,
 )
-from semsig_gis.objects import StreetObjects, licenses_of
+from semsig_gis.objects import Loaded, StreetObjects, licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     import geopandas as gpd
     from numpy.typing import NDArray
 
     from semsig_gis.database.sightings import SightingPairs
+    from semsig_gis.database.viewpoints import ViewpointMode
 
 # The arrays of a block fit into the cache of a processor.
 CELLS_PER_BLOCK = 1 << 14
@@ -138,6 +142,70 @@ def build_database(
             "the streets and the buildings."
         )
     return database
+
+
+def build(
+    data: Loaded | StreetObjects | gpd.GeoDataFrame,
+    path: str | Path | None = None,
+    *,
+    step: float = 10.0,
+    radius: float = 30.0,
+    viewpoints: ViewpointMode | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> City:
+    """Build the signature database of a city, as `semsig build` does.
+
+    Parameters
+    ----------
+    data : Loaded, StreetObjects or GeoDataFrame
+        What `load` returns: its buildings hide what is behind them. Or street objects, or a table
+        of OpenStreetMap elements with their tags.
+    path : str or Path, optional
+        File to write (``.parquet``), with the folder of street objects next to it. Without, the
+        city is only in memory.
+    step : float, default 10
+        Side of a cell in metres.
+    radius : float, default 30
+        Visibility range in metres of classes without their own.
+    viewpoints : {"outdoor", "all", "streets"}, optional
+        Which cells are viewpoints; by default those outdoor if there are buildings, otherwise all.
+    progress : callable, optional
+        Called with the number of finished cells and of all cells.
+
+    Returns
+    -------
+    City
+        The city. `build_database` has more options, and its errors are the same.
+
+    Examples
+    --------
+    >>> from semsig_gis import build
+    >>> city = build(demo_objects)
+    >>> len(city.database) == len(demo_database)
+    True
+    """
+    tables = (data.buildings, data.streets) if isinstance(data, Loaded) else (None, None)
+    buildings, streets = (None if table is None or table.empty else table for table in tables)
+    objects = data.objects if isinstance(data, Loaded) else data
+    if not isinstance(objects, StreetObjects):
+        from semsig_gis.objects import objects_from_frame  # noqa: PLC0415 - it takes 360 ms to load
+
+        objects = objects_from_frame(objects)
+    database = build_database(
+        objects,
+        grid=GridSpec(step),
+        spec=SignatureSpec(radius),
+        viewpoints=ViewpointSpec(mode=viewpoints or ("all" if buildings is None else "outdoor")),
+        footprints=buildings,
+        streets=streets,
+        progress=progress,
+    )
+    store = ObjectStore.of(objects, footprints=buildings, streets=streets)
+    if path is not None:
+        save_with_store(database, store, path)
+    city = City(path)
+    vars(city).update(database=database, store=store)
+    return city
 
 
 def build_cells(
