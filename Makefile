@@ -23,7 +23,7 @@ BIOME := @biomejs/biome@2.6.8
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
 
-demo: $(RUNTIME) ## a made-up city with all steps, into demo/: database, evaluation, map, GeoPackage
+demo: $(RUNTIME) ## a made-up town with all steps, into demo/: maps, report, database, GeoPackage
 	$(BIN)/semsig demo --out demo
 
 test: $(DEV) ## the whole test suite on all processors
@@ -137,7 +137,7 @@ clean: ## remove .venv and everything that the targets write
 
 # The demonstration needs no development tools, so it has a smaller set-up.
 $(RUNTIME): $(FRAME) | $(BIN)/python
-	$(INSTALL) -e .
+	$(INSTALL) -e '.[plot]'
 	@touch $@
 
 $(DEV): $(FRAME) | $(BIN)/python

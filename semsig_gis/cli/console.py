@@ -86,9 +86,13 @@ PIPED_WIDTH = 120  # columns of a pipe or a file
 
 
 def say_sentence(text: str) -> None:
-    """Print a sentence on standard output, in lines as wide as the terminal."""
+    """Print a sentence on standard output, in lines as wide as the terminal.
+
+    Indented lines, such as commands to copy, are left as they are.
+    """
+    width = shutil.get_terminal_size((PIPED_WIDTH, 0)).columns
     for line in visible_lines([text])[0].split("\n"):
-        say(_wrapped(line, shutil.get_terminal_size((PIPED_WIDTH, 0)).columns))
+        say(line if line.startswith(" ") else _wrapped(line, width))
 
 
 def _wrapped(line: str, width: int) -> str:

@@ -140,6 +140,7 @@ from .tables.answer import cities_summary as cities_summary
 from .tables.answer import cities_tables as cities_tables
 from .tables.answer import city_candidates as city_candidates
 from .tables.answer import likeliest_city as likeliest_city
+from .tables.answer import place_sentences as place_sentences
 from .tables.answer import route_summary as route_summary
 from .tables.answer import suggest_summary as suggest_summary
 from .tables.answer import suggest_tables as suggest_tables
