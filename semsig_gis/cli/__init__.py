@@ -104,7 +104,7 @@ def _run() -> int:
         stop_with_supervisor()
     with warnings.catch_warnings():
         # One sentence, without its line of code.
-        warnings.showwarning = lambda message, *_, **__: _remark(str(message))
+        warnings.showwarning = lambda message, category, *_, **__: _warn(str(message), category)
         code = run()
     if sys.stdout is not None:
         sys.stdout.flush()
@@ -169,6 +169,15 @@ def _remark(text: str) -> None:
     from semsig_gis.cli.console import remark
 
     remark(text)
+
+
+def _warn(text: str, category: type[Warning]) -> None:
+    from semsig_gis.cli import console
+    from semsig_gis.core import LongWorkWarning
+
+    if issubclass(category, LongWorkWarning):
+        console.duration_said.set()
+    console.remark(text)
 
 
 def _system_error(error: OSError) -> str:

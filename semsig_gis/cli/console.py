@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
-from semsig_gis.core import visible, visible_lines
+from semsig_gis.core import LONG_S, duration, visible, visible_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -66,6 +66,9 @@ def _interrupt_at_end_of(descriptor: int) -> None:
         time.sleep(INTERRUPT_AGAIN_S)  # a library may have ignored the interrupt
 
 
+duration_said = threading.Event()
+"""Whether a remark has said how long the present work takes."""
+MEASURED_S = 1.0  # of work, before the rest is estimated
 PATIENCE_S = 2.0  # a progress bar appears only if the work takes longer
 
 _AMOUNT = r"[-+±]?(?:\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?|infinite)(?: ?(?:°|%|m|km|km²|m²|MB|s|ms))?"
@@ -261,7 +264,15 @@ def progress(
     )
     task = bar.add_task(label, total=None, count="")
 
+    duration_said.clear()
+
     def advance(completed: int, total: int) -> None:
+        passed = time.perf_counter() - start
+        if total > completed > 0 and passed >= MEASURED_S and not duration_said.is_set():
+            left = passed * (total - completed) / completed
+            if left > LONG_S:
+                duration_said.set()
+                remark(f"{label} takes {duration(left)} more")
         count = f"{completed:,} of {total:,}" if total else f"{completed:,}"
         bar.update(task, completed=completed, total=total or None, count=count)
 

@@ -522,7 +522,7 @@ class SearchOptions:
             from semsig_gis.localization import area_prior
             from semsig_gis.objects import read_area
 
-            area = read_area(self.area, crs=database.crs, near=database.bounds)
+            area = read_area(self.area, crs=database.crs, near=database.bounds.tolist())
             parts.append(area_prior(database, area))
             inside = int((parts[-1] > -math.inf).sum())
             knowledge["area"] = {"file": str(self.area), "cells": inside}

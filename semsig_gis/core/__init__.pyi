@@ -97,7 +97,10 @@ from .presentation import map_with as map_with
 from .presentation import plot_with as plot_with
 from .presentation import register_loader as register_loader
 from .registry import Registry as Registry
+from .resources import LONG_S as LONG_S
+from .resources import LongWorkWarning as LongWorkWarning
 from .resources import announce as announce
+from .resources import duration as duration
 from .resources import free_address_space as free_address_space
 from .resources import raise_if_short as raise_if_short
 from .resources import require_address_space as require_address_space

@@ -25,7 +25,7 @@ CGROUP_FILES = (
     ),
 )
 GB = 1e9
-LONG_S = 600.0
+LONG_S = 60.0
 """Work that takes longer is announced."""
 
 # The system's messages for "no memory" and "no further thread"; some libraries raise only these.
@@ -80,9 +80,19 @@ def raise_if_short(error: Exception) -> None:
         raise MemoryError(str(error)) from error
 
 
+class LongWorkWarning(UserWarning):
+    """A warning of work that takes more than a minute."""
+
+
 def announce(seconds: float, what: str) -> None:
-    """Warn how long `what` will take if it takes more than ten minutes."""
+    """Warn how long `what` will take if it takes more than a minute."""
     if seconds > LONG_S:
-        hours, minutes = divmod(round(seconds / 60.0), 60)
-        time = f"{hours:,} h {minutes} min" if hours else f"{minutes} min"
-        warnings.warn(f"{what} will take about {time}", stacklevel=3)
+        warnings.warn(f"{what} will take {duration(seconds)}", LongWorkWarning, stacklevel=3)
+
+
+def duration(seconds: float) -> str:
+    """Return a time of a minute or more in words: ``about 4 minutes``, ``about 2 h 10 min``."""
+    hours, minutes = divmod(max(round(seconds / 60.0), 1), 60)
+    if hours:
+        return f"about {hours:,} h {minutes} min"
+    return "about a minute" if minutes == 1 else f"about {minutes} minutes"

@@ -210,12 +210,13 @@ def read_area(
     joined = join_areas(shapes)
     if joined is None:
         raise InputError(f"{_named(area)} encloses no area; give {_of_kind(area, 'polygon')}.")
-    if near is not None and not joined.intersects(box_near := shapely.box(*near)):
+    around = None if near is None else shapely.box(near[0], near[1], near[2], near[3])
+    if around is not None and not joined.intersects(around):
         (degrees,) = transformed(np.array([joined]), system, WGS84)
         exchanged = Area(degrees, _named(area)).exchanged
         if exchanged is not None:
             (shape,) = transformed(np.array([exchanged.polygon]), WGS84, system)
-            if np.isfinite(shape.bounds).all() and shape.intersects(box_near):
+            if np.isfinite(shape.bounds).all() and shape.intersects(around):
                 raise exchanged_error(Area(degrees, _named(area)))
     return joined
 

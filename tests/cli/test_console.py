@@ -136,6 +136,26 @@ def test_progress_prints_nothing_without_a_terminal(capsys: pytest.CaptureFixtur
         assert not thread.is_alive()
 
 
+def test_long_work_is_estimated_once(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 0.0
+    monkeypatch.setattr(console.time, "perf_counter", lambda: now)
+    with console.progress("working") as advance:
+        for now, completed in ((0.5, 1), (2.0, 2), (3.0, 3), (5.0, 4)):  # noqa: B007 - the clock
+            advance(completed, 200)
+    assert capsys.readouterr().err == "semsig: working takes about 3 minutes more\n"
+    now = 0.0
+    with console.progress("working") as advance:
+        for now, completed in ((2.0, 100), (4.0, 200)):  # noqa: B007
+            advance(completed, 200)
+    with console.progress("working") as advance:
+        console.duration_said.set()  # by a warning
+        now = 9.0
+        advance(1, 200)
+    assert capsys.readouterr().err == ""
+
+
 @pytest.mark.parametrize(("patience_s", "shown"), [(3600.0, False), (0.0, True)])
 def test_progress_bar_appears_on_a_terminal_after_a_while(
     patience_s: float,

@@ -43,7 +43,13 @@ def test_too_large_work_is_refused_with_both_sizes(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(601.0, "10 min"), (7000.0, "1 h 57 min"), (1e7, "2,777 h 47 min")]
+    ("seconds", "text"),
+    [
+        (61.0, "a minute"),
+        (250.0, "4 minutes"),
+        (7000.0, "1 h 57 min"),
+        (1e7, "2,777 h 47 min"),
+    ],
 )
 def test_long_work_is_announced(seconds: float, text: str) -> None:
     with pytest.warns(UserWarning, match=f"^building will take about {text}$"):
@@ -52,7 +58,7 @@ def test_long_work_is_announced(seconds: float, text: str) -> None:
 
 def test_short_work_is_not_announced() -> None:
     with warnings.catch_warnings(action="error"):
-        resources.announce(599.0, "building")
+        resources.announce(59.0, "building")
 
 
 def test_limit_of_the_control_group_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -459,6 +459,13 @@ class LikelihoodLocator:
         first = [self.scores(query, self.log_prior) for query in queries[:1]]
         return first + [self.scores(query) for query in queries[1:]]
 
+    @property
+    def _namer(self) -> Callable[[float, float], str] | None:
+        """The function that names places: the given one, or else that of the store."""
+        if self.place_name is not None or self.store is None:
+            return self.place_name
+        return self.store.place_name
+
     def rankings(
         self,
         queries: Sequence[Signature],
@@ -601,7 +608,7 @@ class LikelihoodLocator:
             known=self.known,
             prior_ratio=ratio,
             north=self.north,
-            place_name=self.place_name or (self.store and self.store.place_name),
+            place_name=self._namer,
             headings=scores.headings,
             versions=tuple(shares.tolist()),
         )
