@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 
 from semsig_gis import database as databases
 from semsig_gis.commands.model import Reporter, Result, command
-from semsig_gis.commands.options import Database, known_identifiability
+from semsig_gis.commands.options import Database, Symbols, known_identifiability
 from semsig_gis.core import Table
 
 if TYPE_CHECKING:
@@ -90,6 +90,7 @@ class Info:
     """Print the properties of a database next to those in the paper."""
 
     database: Database
+    symbols: Symbols = False
 
     def run(self, reporter: Reporter) -> Result:
         """Return the properties as values and as tables."""
@@ -114,7 +115,7 @@ class Info:
         from semsig_gis.database import database_summary
         from semsig_gis.output import database_sentences, identifiability_sentence
 
-        yield from database_sentences(database_summary(city.database))
+        yield from database_sentences(database_summary(city.database), symbols=self.symbols)
         if columns is not None:
             yield f"{identifiability_sentence(columns)}."
         holders = dict.fromkeys(line.partition(": ")[0] for line in city.licenses)
@@ -129,7 +130,12 @@ class Info:
         )
 
         counts = city.object_counts
-        yield from database_tables(city.database, file_bytes=city.bytes, object_counts=counts)
+        yield from database_tables(
+            city.database,
+            file_bytes=city.bytes,
+            object_counts=counts,
+            symbols=self.symbols,
+        )
         if columns is not None:
             yield from identifiability_tables(columns, object_counts=counts)
         if files := companions(self.database):

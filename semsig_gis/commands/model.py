@@ -362,8 +362,8 @@ def _import_installed_commands() -> None:
 def run_command(request: Any, reporter: Reporter = SILENT) -> Result:  # noqa: ANN401 - any request
     """Check the files of a request, run it, and return the result.
 
-    Raises InputError if a file would be overwritten that the request reads or writes as well, or
-    the name of a file to write has another suffix.
+    Raises InputError if a file would be overwritten that the request reads or writes as well, the
+    name of a file to write has another suffix, or its folder does not exist.
     """
     fields = fields_of(type(request))
     values = {field.name: getattr(request, field.name) for field in fields}
@@ -390,6 +390,11 @@ def run_command(request: Any, reporter: Reporter = SILENT) -> Result:  # noqa: A
         if not fits and not path.is_dir():
             raise InputError(
                 f"{path} cannot be written; the name must end in {' or '.join(suffixes)}."
+            )
+        if suffixes != ("",) and not path.parent.is_dir():  # a folder of results is made
+            raise InputError(
+                f"{path} cannot be written, because there is no folder {path.parent}; make it, or "
+                "give another name."
             )
     result: Result = request.run(reporter)
     return result

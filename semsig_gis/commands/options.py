@@ -102,8 +102,8 @@ Explain = Annotated[
 Symbols = Annotated[
     bool,
     Option(
-        "Print classes in tables as letters, such as DDBL, instead of words.",
-        title="Classes as letters",
+        "Print the letters of classes, such as DDBL for what a cell sees.",
+        title="Letters of classes",
         advanced=True,
     ),
 ]
@@ -327,7 +327,7 @@ class QueryOptions:
             "heading": self.look,
             "sectors": self.sectors,
         }
-        if self.seen is None and self.types is None and self.bearings is None:
+        if not (self.seen or "").strip() and self.types is None and self.bearings is None:
             raise InputError(
                 "nothing was asked; say what was seen, such as 'bench at 40, lamp at 80', or give "
                 f"--types, --bearings or both{others}."

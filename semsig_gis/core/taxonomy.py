@@ -204,8 +204,9 @@ class Taxonomy(Displayed):
 
     def _unknown_symbol(self, symbol: str) -> UnknownNameError:
         near = nearest_name(symbol, [item.symbol for item in self.classes])
-        legend = ", ".join(f"{item.symbol} {item.title.lower()}" for item in self.classes)
-        return UnknownNameError(f"symbol {symbol!r} is unknown{near}; the symbols are {legend}.")
+        return UnknownNameError(
+            f"symbol {symbol!r} is unknown{near}; `semsig info --symbols` lists those of a city."
+        )
 
     def decode(self, codes: ArrayLike) -> str:
         """Return the symbols of class codes, shape (n,), the inverse of `encode`."""

@@ -168,9 +168,9 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
         code = next((class_words[form][0] for form in forms if form in class_words), None)
     if code is None:
         near = nearest_name(text, (name for _, name in class_words.values()))
-        legend = ", ".join(f"{item.symbol} {item.title.lower()}" for item in taxonomy.classes)
         raise UnknownNameError(
-            f"class {word!r} is unknown{near}; give a word for one of these: {legend}."
+            f"class {word!r} is unknown{near}; `semsig info` lists the classes of a city, and "
+            "`semsig sources` those of a catalogue."
         )
     return code
 

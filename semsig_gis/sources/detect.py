@@ -9,6 +9,7 @@ from semsig_gis.core import InputError
 from semsig_gis.sources.files import file_reader
 from semsig_gis.sources.paths import files_in, require_file
 from semsig_gis.sources.probe import probe_file
+from semsig_gis.storage import file_kind
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,6 +23,14 @@ CATALOG_OF_READER = {
     "overpass": ("openstreetmap", "an answer of an Overpass server"),
     "overture": ("overture", "a table of Overture Maps, by its columns"),
 }
+
+
+# What to do with a file that `semsig load` does not read, by what it is.
+USES = {
+    "street objects": "give it to `semsig build`",
+    "signature database": "ask it with `semsig localize`, or see it with `semsig info`",
+}
+PICTURES = frozenset({".jpg", ".jpeg", ".png", ".webp", ".heic", ".tif", ".tiff", ".gif", ".bmp"})
 
 
 def detect_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -40,11 +49,26 @@ def detect_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple
             if reader is None and any(map(OVERTURE_COLUMNS.issubset, probe_file(file).columns)):
                 reader = "overture"
             if reader is None:
-                raise InputError(
-                    f"{file} does not say what it contains; name its catalogue with --catalog "
-                    "(`semsig sources` lists them), or draft one with `semsig draft`."
-                )
+                raise InputError(_unknown(file))
             name, description = CATALOG_OF_READER[reader]
             names.append(name)
             lines.append(f"{file} is read as {description}, with the catalogue {name}")
     return tuple(dict.fromkeys(names)), tuple(lines)
+
+
+def _unknown(file: Path) -> str:
+    """Return a sentence on a file that belongs to no catalogue: what it is, and what to do."""
+    if file.suffix.lower() in PICTURES:
+        return (
+            f"{file} is a picture, and maps are read here; mark what is seen on it with `semsig "
+            "serve`, or give the boxes of a detector to `semsig view`."
+        )
+    kind = file_kind(file) if file.suffix.lower() == ".parquet" else ""
+    if kind in USES:
+        return f"{file} is a {kind} file, which is read already; {USES[kind]}."
+    if kind:
+        return f"{file} holds {kind}, not street objects; give a file of street objects."
+    return (
+        f"{file} does not say what it contains; name its catalogue with --catalog (`semsig "
+        "sources` lists them), or draft one with `semsig draft`."
+    )

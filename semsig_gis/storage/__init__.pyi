@@ -11,6 +11,7 @@ from .geoparquet import add_footer_checksum as add_footer_checksum
 from .geoparquet import bounds_by_group as bounds_by_group
 from .geoparquet import bounds_column as bounds_column
 from .geoparquet import check_footer_checksum as check_footer_checksum
+from .geoparquet import file_kind as file_kind
 from .geoparquet import geo_metadata as geo_metadata
 from .geoparquet import groups_meeting as groups_meeting
 from .geoparquet import hilbert_order as hilbert_order

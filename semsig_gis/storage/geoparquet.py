@@ -367,7 +367,9 @@ def read_geoparquet(
         crs = _crs_of(json.dumps(parse_json(metadata[b"geo"])["columns"]["geometry"]["crs"]))
         stored = specs["kind"]
     except (KeyError, TypeError, ValueError, CRSError) as error:
-        raise DatabaseError(f"{file} was not written by semsig; give a {kind} file.") from error
+        other = file_kind(file)
+        what = f"holds {other}" if other else "was not written by semsig"
+        raise DatabaseError(f"{file} {what}; give a {kind} file.") from error
     if stored != kind:
         raise DatabaseError(f"{file} is a {stored} file; give a {kind} file.")
     try:
@@ -386,6 +388,32 @@ def read_geoparquet(
             f"{file} lacks the column {min(missing)!r}; make the {kind} file again."
         )
     return table, specs, crs
+
+
+# The contents of a file without a kind, by the type of its shapes.
+SURROUNDINGS = {
+    "Polygon": "buildings, for semsig build --buildings",
+    "LineString": "streets, for semsig build --streets",
+}
+
+
+def file_kind(path: Path) -> str:
+    """Return what a GeoParquet file is: its kind, or else the use of its shapes; empty if unknown.
+
+    Examples
+    --------
+    >>> file_kind(Path("nowhere.parquet"))
+    ''
+    """
+    try:
+        metadata = pq.read_schema(path).metadata or {}
+        if SPEC_KEY in metadata:
+            return str(parse_json(metadata[SPEC_KEY])["kind"])
+        shapes = parse_json(metadata[b"geo"])["columns"]["geometry"]["geometry_types"]
+    except (pa.ArrowException, OSError, KeyError, TypeError, ValueError):
+        return ""
+    kinds = {str(shape).removeprefix("Multi") for shape in shapes}
+    return next((use for shape, use in SURROUNDINGS.items() if kinds == {shape}), "")
 
 
 @functools.lru_cache(maxsize=16)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database import Companion, SignatureDatabase
 
-MOST_TYPES = 20  # symbols that fit into a table
+MOST_TYPES = 20  # objects that fit into a table
 GROUP_LABELS = {"alone": "cells in a group of one", "entropy_bits": "entropy, in bits"}
 
 
@@ -23,15 +23,30 @@ def database_tables(
     *,
     file_bytes: int | None = None,
     object_counts: Mapping[int, int] | None = None,
+    symbols: bool = False,
 ) -> tuple[Table, ...]:
-    """Return the paper's Tables 1, 2a and 2b for a database, and tables of classes and notes."""
+    """Return the paper's Tables 1, 2a and 2b for a database, and tables of classes and notes.
+
+    With `symbols`, a class has its letter as well.
+    """
     facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
+    facts["occurrences"] = [
+        {**item, "title": class_label(item, symbols=symbols)} for item in facts["occurrences"]
+    ]
+    types = facts["largest_type_group"]["types"]
+    first = types[:MOST_TYPES]
+    text = first if symbols else database.taxonomy.words(database.taxonomy.encode(first))
+    more = f"… ({len(types)} objects)" if len(types) > MOST_TYPES else ""
+    facts["largest_type_group"]["types"] = text + more
     tables = (_occurrence_table, _property_table, _group_table, _class_table)
     return (*(table(facts) for table in tables), *note_tables(facts["notes"]))
 
 
-def database_sentences(facts: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the size of a database, how distinct its cells are, and the classes that are seen."""
+def database_sentences(facts: Mapping[str, Any], *, symbols: bool = False) -> Iterator[str]:
+    """Yield the size of a database, how distinct its cells are, and the classes that are seen.
+
+    With `symbols`, a class has its letter as well.
+    """
     yield (
         f"{facts['signatures']:,} cells of {facts['step_m']:g} m see {facts['mean_length']:.1f} "
         f"street objects on average, up to {facts['radius_m']:g} m away; "
@@ -39,7 +54,8 @@ def database_sentences(facts: Mapping[str, Any]) -> Iterator[str]:
         "other cell sees."
     )
     seen = sorted(facts["occurrences"], key=lambda item: -item["number"])
-    yield f"Seen: {', '.join(item['title'].lower() for item in seen if item['number'])}."
+    names = (class_label(item, symbols=symbols) for item in seen if item["number"])
+    yield f"Seen: {', '.join(names)}."
 
 
 def companion_table(title: str, companions: Iterable[Companion]) -> Table:
@@ -54,10 +70,10 @@ def _occurrence_table(facts: Mapping[str, Any]) -> Table:
     numbers = [paris.OCCURRENCES.get(item["name"]) for item in items]
     return Table(
         "Occurrences by class",
-        ("Class (symbol)", "Number", "Share", paris.COLUMN, "Share"),
+        ("Class", "Number", "Share", paris.COLUMN, "Share"),
         tuple(
             (
-                *(class_label(item), f"{item['number']:,}", percent(item["share"], 1)),
+                *(item["title"], f"{item['number']:,}", percent(item["share"], 1)),
                 *(("", "") if number is None else (f"{number:,}", percent(number / total, 1))),
             )
             for item, number in zip(items, numbers, strict=True)
@@ -66,9 +82,10 @@ def _occurrence_table(facts: Mapping[str, Any]) -> Table:
     )
 
 
-def class_label(item: Mapping[str, Any]) -> str:
-    """Return the title and symbol of a class."""
-    return f"{item['title']} ({item['symbol']})"
+def class_label(item: Mapping[str, Any], *, symbols: bool) -> str:
+    """Return the title of a class in lower case, with its symbol or without."""
+    title = str(item["title"]).lower()
+    return f"{title} ({item['symbol']})" if symbols else title
 
 
 def _property_table(facts: Mapping[str, Any]) -> Table:
@@ -78,9 +95,6 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
     exceptions = sum(item["range_m"] != facts["radius_m"] for item in present)
     others = f" ({exceptions} classes have their own)" if exceptions else ""
     occlusion = "none" if depth is None else f"by buildings, more than {depth:g} m deep"
-    types = largest["types"]
-    if len(types) > MOST_TYPES:
-        types = f"{types[:MOST_TYPES]}… ({len(types)} objects)"
     return Table(
         "Database",
         ("Property", "Ours", paris.COLUMN),
@@ -102,7 +116,11 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
             ("Covered area", f"{facts['covered_km2']:.1f} km²", "79 km²"),
             ("File", "" if megabytes is None else f"{megabytes:.1f} MB", "38.7 MB"),
             ("File per km²", "" if density is None else f"{density:.2f} MB", "1.24 MB"),
-            ("Largest group by type", f"{types}, {largest['cells']:,} cells", "DDD, 29,958 cells"),
+            (
+                "Largest group by type",
+                f"{largest['types']}, {largest['cells']:,} cells",
+                "DDD, 29,958 cells",
+            ),
         ),
         (
             "Our covered area is cells times the area of a cell; by that count "
@@ -159,7 +177,7 @@ def _class_table(facts: Mapping[str, Any]) -> Table:
     return Table.of_columns(
         "Classes that occur",
         {
-            "Class (symbol)": map(class_label, items),
+            "Class": [item["title"] for item in items],
             "Range, m": [f"{item['range_m']:g}" for item in items],
             **objects,
             "Objects per km²": [f"{item['objects_per_km2']:,.1f}" for item in items],

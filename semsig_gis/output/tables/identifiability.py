@@ -62,7 +62,7 @@ def identifiability_tables(
     )
     items = facts["classes"]
     classes: dict[str, Iterable[str]] = {
-        "Class (symbol)": map(class_label, items),
+        "Class": [class_label(item, symbols=False) for item in items],
         f"Chance {within}": [f"{100 * item['chance_near']:+.2f} %" for item in items],
         "Bits": [f"{item['bits']:+.3f}" for item in items],
     }
@@ -179,7 +179,7 @@ def _band_shares(facts: Mapping[str, Any]) -> dict[str, float]:
 def _class_section(facts: Mapping[str, Any]) -> Section:
     numbers = []
     for item in facts["classes"]:
-        row = class_label(item)
+        row = class_label(item, symbols=False)
         numbers += [
             Number(row, f"chance within {facts['radius_m']:g} m", item["chance_near"]),
             Number(row, "bits", item["bits"], decimals=3),
