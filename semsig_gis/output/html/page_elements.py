@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 
 MAX_ZOOM = 20
 FIRST_VIEW_ZOOM = 17  # highest zoom of the first view of a new map
+VIEW_QUANTILES = (0.0025, 0.9975)  # of x and of y; both leave out 1 % of the places at most
+VIEW_MARGIN = 0.05  # of the sides of that box
 # Files of the folder ``js`` that every page contains, in this order.
 PAGE_FILES = (
     *("page.css", "panel.css", "layers.js", "state.js", "panel.js", "wheels.js", "search.js"),
@@ -303,8 +305,14 @@ def exact_latlon(xy: ArrayLike, crs: CRS) -> list[list[float]]:
 
 
 def corners_of(source: SignatureDatabase | StreetObjects) -> NDArray[np.float64]:
-    """Return latitudes and longitudes of two corners of the box around all places."""
-    return to_latlon(np.stack([source.xy.min(axis=0), source.xy.max(axis=0)]), source.crs)
+    """Return latitudes and longitudes of two corners of a box around 99 % of the places.
+
+    The few places far from the others would make the rest of a map tiny.
+    """
+    least, low, high, most = np.quantile(source.xy, [0.0, *VIEW_QUANTILES, 1.0], axis=0)
+    margin = VIEW_MARGIN * (high - low)
+    box = np.stack([np.maximum(least, low - margin), np.minimum(most, high + margin)])
+    return to_latlon(box, source.crs)
 
 
 def panel_signs(database: SignatureDatabase) -> dict[str, Any]:

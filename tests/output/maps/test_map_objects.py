@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import folium
 import geopandas as gpd
 import numpy as np
+import pandas as pd
 import pytest
 import shapely
 from map_pages import HOSTILE, LEGEND, MapPage, assert_quiet
@@ -49,6 +50,23 @@ def click(page: MapPage, number: int) -> str:
     page.ask("map.setView(arguments[0], 20, {animate: false})", place_of(number))
     page.click_at(place_of(number))
     return page.panel()
+
+
+def test_first_view_leaves_out_few_places_far_from_the_others(page: MapPage) -> None:
+    table = OBJECTS.table.copy()
+    far = table.geometry.to_numpy()
+    far[NUMBER] = shapely.transform(far[NUMBER], lambda xy: xy + 90_000.0)
+    many = pd.concat([OBJECTS.table] * 20 + [table.set_geometry(far)], ignore_index=True)
+    objects = dataclasses.replace(OBJECTS, table=many)
+    page.open(objects_map(objects))
+    south, west, north, east = page.ask(
+        "const box = map.getBounds();"
+        "return [box.getSouth(), box.getWest(), box.getNorth(), box.getEast()]"
+    )
+    town = to_latlon(OBJECTS.xy, OBJECTS.crs)
+    assert (np.array([south, west]) <= town.min(axis=0)).all()
+    assert (np.array([north, east]) >= town.max(axis=0)).all()
+    assert north - south < 0.1  # degrees, where the far object is about 0.8 away
 
 
 def test_objects_map_has_layers_and_legend_by_class(page: MapPage) -> None:
