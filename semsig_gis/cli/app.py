@@ -24,6 +24,8 @@ from semsig_gis.cli.console import (
 )
 from semsig_gis.commands import (
     GROUPS,
+    OUTPUT,
+    PANELS,
     Command,
     Field,
     Option,
@@ -57,17 +59,23 @@ HELP_ALL = typer.Option(
 class Printing:
     """Options of the command line that are not fields of a request."""
 
-    json: Annotated[bool, Option("Print JSON for other programs.")] = False
+    json: Annotated[bool, Option("Print JSON for other programs.", panel=OUTPUT)] = False
     quiet: Annotated[
         bool,
         Option(
             "Print only the paths of the written files, or only the result if there are none.",
             short="-q",
+            panel=OUTPUT,
         ),
     ] = False
-    tables: Annotated[bool, Option("Print tables with the details as well.")] = False
+    tables: Annotated[bool, Option("Print tables with the details as well.", panel=OUTPUT)] = False
     verbose: Annotated[
-        bool, Option("Print the tables, and report each step and how long it took.", short="-v")
+        bool,
+        Option(
+            "Print the tables, and report each step and how long it took.",
+            short="-v",
+            panel=OUTPUT,
+        ),
     ] = False
 
 
@@ -81,18 +89,22 @@ class _Command(TyperCommand):
     """A command: its help has the usual options, and words for values instead of types."""
 
     fields: Mapping[str, Field]
+    examples: tuple[str, ...]
 
     def format_options(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - of typer
-        sections: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
+        sections: dict[str, list[tuple[str, str]]] = {panel: [] for panel in (*PANELS, "Help")}
         for parameter in self.get_params(ctx):
             field = self.fields.get(parameter.name)
             if field is None:  # --help and --help-all
-                sections["Options"].append(parameter.get_help_record(ctx) or ("", ""))
+                sections["Help"].append(parameter.get_help_record(ctx) or ("", ""))
             elif not field.option.advanced or SHOW_ALL in ctx.meta:
                 details = f"  [{'; '.join(field.details)}]" if field.details else ""
-                heading = "Arguments" if field.option.positional else "Options"
-                sections[heading].append((field.usage, field.option.help + details))
+                sections[field.panel].append((field.usage, field.option.help + details))
         _write_sections(formatter, sections)
+        if self.examples:
+            with formatter.section("Examples"):
+                for example in self.examples:
+                    formatter.write_text(example)
 
 
 class _Commands(Mapping[str, Any]):
@@ -197,6 +209,7 @@ def _typer_command(command: Command) -> Any:  # noqa: ANN401 - of typer
     single.command(command.name, cls=_Command, help=command.help)(run)
     parsed: Any = typer.main.get_command(single)
     parsed.fields = {field.name: field for field in fields}
+    parsed.examples = command.examples
     return parsed
 
 

@@ -24,7 +24,16 @@ from semsig_gis.core import extra
 MOST_PORT = 65535
 
 
-@command("serve", title="Workbench", group="Localization", order=4)
+@command(
+    "serve",
+    title="Workbench",
+    group="Ask",
+    order=2,
+    examples=(
+        "semsig serve city.parquet",
+        "semsig serve city.parquet --no-browser --port 8000",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Serve:
     """Locate photos in a page of the browser, on this machine only.

@@ -2,6 +2,8 @@
 
 from .localize import Localize as Localize
 from .model import GROUPS as GROUPS
+from .model import OUTPUT as OUTPUT
+from .model import PANELS as PANELS
 from .model import SILENT as SILENT
 from .model import Command as Command
 from .model import Field as Field

@@ -82,9 +82,13 @@ METHODS: Mapping[str, Callable[[_Task], dict[str, Any]]] = {
 @command(
     "benchmark",
     title="Benchmark on photographs",
-    group="Accuracy",
-    order=6,
+    group="Research",
+    order=2,
     returns="semsig_gis.evaluation:PhotographRecord",
+    examples=(
+        "semsig benchmark flatlandia photos --out figures.json",
+        "semsig benchmark london-lights photos --methods default --limit 50",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Benchmark:

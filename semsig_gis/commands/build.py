@@ -22,7 +22,17 @@ Role = Literal["buildings", "streets"]
 ROLES: tuple[Role, ...] = ("buildings", "streets")
 
 
-@command("build", title="Build signature database", group="Databases", order=1, returns=Properties)
+@command(
+    "build",
+    title="Build signature database",
+    group="Prepare",
+    order=5,
+    returns=Properties,
+    examples=(
+        "semsig build objects.parquet --out city.parquet",
+        "semsig build objects.parquet --out city.parquet --radius 50",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Build:
     """Build a signature database from street objects.

@@ -32,9 +32,13 @@ if TYPE_CHECKING:
 @command(
     "calibrate",
     title="Calibrate the answers",
-    group="Detectors",
-    order=3,
+    group="Measure",
+    order=5,
     returns="semsig_gis.localization:RuleRecord",
+    examples=(
+        "semsig calibrate city.parquet --samples known.csv --out rule.json",
+        "semsig calibrate city.parquet --samples known.csv --out rule.json --refine",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Calibrate:

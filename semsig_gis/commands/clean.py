@@ -27,7 +27,17 @@ class Cleaned(TypedDict):
     removed: list[databases.Companion]
 
 
-@command("clean", title="Remove leftover files", group="Databases", order=5, returns=Cleaned)
+@command(
+    "clean",
+    title="Remove leftover files",
+    group="Prepare",
+    order=9,
+    returns=Cleaned,
+    examples=(
+        "semsig clean city.parquet --dry-run",
+        "semsig clean city.parquet --objects",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Clean:
     """Remove leftover files next to a database.

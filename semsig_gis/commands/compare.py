@@ -21,9 +21,13 @@ RESULT = Option(
 @command(
     "compare",
     title="Compare results",
-    group="Accuracy",
+    group="Measure",
     order=3,
     returns="semsig_gis.evaluation:ComparisonRecord",
+    examples=(
+        "semsig compare results results_of_yesterday",
+        "semsig compare results other_results --tables",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Compare:

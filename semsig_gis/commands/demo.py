@@ -45,7 +45,17 @@ class _Example:
     answer: Location
 
 
-@command("demo", title="Demonstration", group="Street objects", order=6, returns=Demonstrated)
+@command(
+    "demo",
+    title="Demonstration",
+    group="Look",
+    order=1,
+    returns=Demonstrated,
+    examples=(
+        "semsig demo",
+        "semsig demo --out town --seed 7",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Demo:
     """Run every step on a small made-up town, offline."""

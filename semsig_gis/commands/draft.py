@@ -10,7 +10,16 @@ from semsig_gis.commands.load import Crs
 from semsig_gis.commands.model import Option, Reporter, Result, command
 
 
-@command("draft", title="Draft a catalogue", group="Street objects", order=4)
+@command(
+    "draft",
+    title="Draft a catalogue",
+    group="Prepare",
+    order=4,
+    examples=(
+        "semsig draft trees.geojson",
+        "semsig draft lamps.shp --crs EPSG:2154",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Draft:
     """Draft a catalogue for a vector file, for you to edit."""

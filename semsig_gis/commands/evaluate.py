@@ -35,9 +35,13 @@ if TYPE_CHECKING:
 @command(
     "evaluate",
     title="Evaluate",
-    group="Accuracy",
+    group="Measure",
     order=1,
     returns="semsig_gis.evaluation:EvaluationRecord",
+    examples=(
+        "semsig evaluate city.parquet --out results --report report.html",
+        "semsig evaluate city.parquet --distortion light --queries 100",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Evaluate:

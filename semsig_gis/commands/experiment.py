@@ -18,9 +18,13 @@ if TYPE_CHECKING:
 @command(
     "experiment",
     title="Run an experiment",
-    group="Accuracy",
-    order=2,
+    group="Research",
+    order=1,
     returns="semsig_gis.evaluation:ExperimentRecord",
+    examples=(
+        "semsig experiment methods.toml --out results",
+        "semsig experiment methods.toml --out results --workers 4",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Experiment:

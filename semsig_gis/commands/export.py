@@ -28,7 +28,17 @@ class Exported(TypedDict):
     cells: NotRequired[int]
 
 
-@command("export", title="Export to other programs", group="Results", order=2, returns=Exported)
+@command(
+    "export",
+    title="Export to other programs",
+    group="Look",
+    order=4,
+    returns=Exported,
+    examples=(
+        "semsig export city.parquet --out city.gpkg",
+        "semsig export city.parquet --layer ambiguity --out ambiguity.tif",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Export:
     """Export cells, objects and queries for QGIS and other programs."""

@@ -11,7 +11,17 @@ from semsig_gis.commands.model import Option, Reporter, Result, command
 from semsig_gis.core import EmptyResultError, InputError
 
 
-@command("fetch", title="Download street objects", group="Street objects", order=2, returns=Quality)
+@command(
+    "fetch",
+    title="Download street objects",
+    group="Prepare",
+    order=2,
+    returns=Quality,
+    examples=(
+        "semsig fetch overpass --area 7.40,43.72,7.44,43.75 --out objects.parquet",
+        "semsig fetch opendata_paris --area quarter.geojson --out objects.parquet",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Fetch(LoadOptions):
     """Download the street objects of an area."""

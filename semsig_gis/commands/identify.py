@@ -36,9 +36,13 @@ if TYPE_CHECKING:
 @command(
     "identify",
     title="Predict the accuracy",
-    group="Accuracy",
-    order=5,
+    group="Measure",
+    order=2,
     returns="semsig_gis.evaluation:IdentifiabilityRecord",
+    examples=(
+        "semsig identify city.parquet",
+        "semsig identify city.parquet --view 90 --check 1000",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Identify:

@@ -21,7 +21,17 @@ class Imported(TypedDict):
     street_objects: NotRequired[int]
 
 
-@command("import", title="Import from QGIS", group="Results", order=3, returns=Imported)
+@command(
+    "import",
+    title="Import from QGIS",
+    group="Prepare",
+    order=8,
+    returns=Imported,
+    examples=(
+        "semsig import city.gpkg --out city.parquet",
+        "semsig import city.gpkg --out city.parquet --objects objects.parquet",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Import:
     """Restore a database from an exported GeoPackage."""

@@ -84,7 +84,17 @@ class Properties(TypedDict):
     files: list[databases.Companion]
 
 
-@command("info", title="Properties of a database", group="Databases", order=4, returns=Properties)
+@command(
+    "info",
+    title="Properties of a database",
+    group="Look",
+    order=2,
+    returns=Properties,
+    examples=(
+        "semsig info city.parquet",
+        "semsig info city.parquet --symbols --tables",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Info:
     """Print the properties of a database next to those in the paper."""

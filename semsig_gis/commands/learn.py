@@ -44,9 +44,13 @@ SAMPLES = Option(
 @command(
     "learn",
     title="Learn detector errors",
-    group="Detectors",
-    order=2,
+    group="Measure",
+    order=4,
     returns="semsig_gis.localization:LearnRecord",
+    examples=(
+        "semsig learn city.parquet --samples known.csv --out camera.toml",
+        "semsig learn city.parquet --unlabelled views.jsonl --out camera.toml",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Learn:

@@ -213,7 +213,17 @@ class LoadOptions:
         yield from quality_tables(replace(report, notes=()))
 
 
-@command("load", title="Load street objects", group="Street objects", order=1, returns=Quality)
+@command(
+    "load",
+    title="Load street objects",
+    group="Prepare",
+    order=1,
+    returns=Quality,
+    examples=(
+        "semsig load monaco.osm.pbf --out objects.parquet",
+        "semsig load trees.geojson --catalog city.toml --out objects.parquet",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Load(LoadOptions):
     """Read files of open data into street objects."""

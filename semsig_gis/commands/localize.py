@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from semsig_gis.commands.cities import locate_in_cities, split_databases
-from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.commands.model import OUTPUT, SAW, SEARCH, Option, Reporter, Result, command
 from semsig_gis.commands.options import (
     MOST_METRES,
     Explain,
@@ -40,16 +40,20 @@ PLACES = ("near", "area", "popularity", "objects")
 @command(
     "localize",
     title="Localize",
-    group="Localization",
+    group="Ask",
     order=1,
     returns="semsig_gis.output:LocalizeRecord",
+    examples=(
+        "semsig localize city.parquet 'bench at 40, lamp at 80, bus stop left'",
+        "semsig localize city.parquet --queries views.jsonl",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Localize(SearchOptions, QueryOptions):
     """Find where a view was seen from, or many views.
 
-    --explain, --share and the options from --noise to --objects work only with the likelihood
-    method.
+    By likelihood, every place gets a chance. A method by distance takes only what was seen and
+    --require of what is known, and cannot explain.
     """
 
     more: Annotated[
@@ -69,6 +73,7 @@ class Localize(SearchOptions, QueryOptions):
             title="File of queries",
             metavar="FILE|-",
             reads=True,
+            panel=SAW,
         ),
     ] = None
     adapt: Annotated[
@@ -77,6 +82,7 @@ class Localize(SearchOptions, QueryOptions):
             "Adapt the noise to all --queries first, which are views of one camera and detector.",
             title="Adapt the errors to the queries",
             advanced=True,
+            panel=SEARCH,
         ),
     ] = False
     method: MethodText = None
@@ -106,6 +112,7 @@ class Localize(SearchOptions, QueryOptions):
             low=0.001,
             high=1,
             advanced=True,
+            panel=OUTPUT,
         ),
     ] = None
     within: Annotated[
@@ -117,6 +124,7 @@ class Localize(SearchOptions, QueryOptions):
             low=0,
             high=MOST_METRES,
             advanced=True,
+            panel=OUTPUT,
         ),
     ] = 0.0
 

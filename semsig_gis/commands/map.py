@@ -29,7 +29,17 @@ class Drawn(TypedDict):
     map: str
 
 
-@command("map", title="Draw a map", group="Results", order=1, returns=Drawn)
+@command(
+    "map",
+    title="Draw a map",
+    group="Look",
+    order=3,
+    returns=Drawn,
+    examples=(
+        "semsig map city.parquet --ambiguity --out map.html",
+        "semsig map city.parquet --evaluation results --out map.html",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Map:
     """Draw cells, evaluations, changes, answers or objects on a map."""

@@ -21,7 +21,17 @@ class Merged(TypedDict):
     recomputed: int
 
 
-@command("merge", title="Merge signature databases", group="Databases", order=3, returns=Merged)
+@command(
+    "merge",
+    title="Merge signature databases",
+    group="Prepare",
+    order=7,
+    returns=Merged,
+    examples=(
+        "semsig merge west.parquet east.parquet --out city.parquet",
+        "semsig merge west.parquet east.parquet --out city.parquet --json",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Merge:
     """Merge the databases of two places into one.

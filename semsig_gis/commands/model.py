@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Table
 
-GROUPS = ("Street objects", "Databases", "Localization", "Detectors", "Accuracy", "Results")
+GROUPS = ("Prepare", "Ask", "Look", "Measure", "Research")
 """Headings under which front ends list the commands, in their order."""
 
 Advance = Callable[[int, int], None]
@@ -122,6 +122,9 @@ class Option:
         Returns names that the value may have, among others, for completion.
     short : str, optional
         Short name on the command line, such as ``-q``.
+    panel : str, optional
+        One of `PANELS`, the heading in the help; by default that of output for a file that is
+        written.
     """
 
     help: str
@@ -137,6 +140,18 @@ class Option:
     writes: str | tuple[str, ...] | None = dataclasses.field(default=None, kw_only=True)
     suggestions: Callable[[], Sequence[str]] | None = dataclasses.field(default=None, kw_only=True)
     short: str = dataclasses.field(default="", kw_only=True)
+    panel: str = dataclasses.field(default="", kw_only=True)
+
+
+ARGUMENTS, SAW, KNOW, SEARCH, OPTIONS, OUTPUT = PANELS = (
+    "Arguments",
+    "What you saw",
+    "What you know",
+    "How it is searched",
+    "Options",
+    "Output",
+)
+"""Headings of the options in the help, in their order."""
 
 
 METAVARS = {"m": "METRES", "°": "DEGREES", "s": "SECONDS", "years": "YEARS"}
@@ -170,6 +185,13 @@ class Field:
         """The suffixes of the file that is written; empty if none is."""
         writes = self.option.writes
         return (writes,) if isinstance(writes, str) else writes or ()
+
+    @property
+    def panel(self) -> str:
+        """The heading of the option in the help."""
+        if self.option.positional:
+            return ARGUMENTS
+        return self.option.panel or (OUTPUT if self.suffixes else OPTIONS)
 
     @property
     def title(self) -> str:
@@ -238,7 +260,10 @@ def _text(value: object) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """A command: its name, its group, the class of its requests and the type of its values."""
+    """A command: its name, its group, the class of its requests and the type of its values.
+
+    `examples` are command lines.
+    """
 
     name: str
     title: str
@@ -246,6 +271,7 @@ class Command:
     order: int
     request: type[Any]
     returns: Any
+    examples: tuple[str, ...] = ()
 
     @property
     def help(self) -> str:
@@ -306,13 +332,15 @@ def command(
     group: str,
     order: int,
     returns: Any = None,  # noqa: ANN401 - any type
+    examples: tuple[str, ...] = (),
 ) -> Callable[[type[T]], type[T]]:
     """Return a decorator that registers a frozen dataclass as a command.
 
     The class has fields that are annotated with an `Option`, and a method ``run(reporter)`` that
     returns a `Result`. Its docstring is the help. `order` sorts the commands of a group, and
     `returns` is the type of the values of the result, usually a TypedDict, or its
-    ``"module:name"`` if the module is slow to import; None: it has none.
+    ``"module:name"`` if the module is slow to import; None: it has none. `examples` are command
+    lines for the help.
     """
     if group not in GROUPS:
         raise InputError(f"{group!r} is no group of commands; give one of {', '.join(GROUPS)}.")
@@ -325,7 +353,13 @@ def command(
                 f"{request.__module__}; rename one of them."
             )
         _COMMANDS[name] = Command(
-            name=name, title=title, group=group, order=order, request=request, returns=returns
+            name=name,
+            title=title,
+            group=group,
+            order=order,
+            request=request,
+            returns=returns,
+            examples=examples,
         )
         return request
 

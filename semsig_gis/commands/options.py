@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from semsig_gis.commands.model import Option, Reporter
+from semsig_gis.commands.model import KNOW, OUTPUT, SAW, SEARCH, Option, Reporter
 from semsig_gis.core import (
     DEFAULT_METHOD,
     PAPER_METHOD,
@@ -78,6 +78,7 @@ MethodText = Annotated[
         metavar="METHOD",
         default=DEFAULT_METHOD,
         advanced=True,
+        panel=SEARCH,
     ),
 ]
 Paper = Annotated[
@@ -86,10 +87,18 @@ Paper = Annotated[
         f"Rank as the paper does: --method {PAPER_METHOD}.",
         title="Method of the paper",
         advanced=True,
+        panel=SEARCH,
     ),
 ]
 Top = Annotated[
-    int, Option("Number of candidates.", title="Number of candidates", low=1, high=MOST_TOP)
+    int,
+    Option(
+        "Number of candidates.",
+        title="Number of candidates",
+        low=1,
+        high=MOST_TOP,
+        panel=OUTPUT,
+    ),
 ]
 Explain = Annotated[
     bool,
@@ -97,6 +106,7 @@ Explain = Annotated[
         "Show which objects of the view match which street objects, which were missed and which "
         "look false.",
         title="Explain the best places",
+        panel=OUTPUT,
     ),
 ]
 Symbols = Annotated[
@@ -105,6 +115,7 @@ Symbols = Annotated[
         "Print the letters of classes, such as DDBL for what a cell sees.",
         title="Letters of classes",
         advanced=True,
+        panel=OUTPUT,
     ),
 ]
 NorthText = Literal["grid", "true", "magnetic"]
@@ -114,6 +125,7 @@ NorthName = Annotated[
         "North from which bearings are measured; grid north is that of the database.",
         title="North of the bearings",
         advanced=True,
+        panel=SAW,
     ),
 ]
 Day = Annotated[
@@ -124,6 +136,7 @@ Day = Annotated[
         metavar="YYYY-MM-DD",
         default="today",
         advanced=True,
+        panel=SAW,
     ),
 ]
 NoiseName = Annotated[
@@ -135,6 +148,7 @@ NoiseName = Annotated[
         metavar="NAME|FILE",
         reads=True,
         suggestions=noises,
+        panel=SEARCH,
     ),
 ]
 MapAge = Annotated[
@@ -146,6 +160,7 @@ MapAge = Annotated[
         low=0,
         high=100,
         advanced=True,
+        panel=KNOW,
     ),
 ]
 DriftReport = Annotated[
@@ -157,6 +172,7 @@ DriftReport = Annotated[
         default="that of Monaco in OpenStreetMap",
         reads=True,
         advanced=True,
+        panel=KNOW,
     ),
 ]
 Heading = Annotated[
@@ -167,6 +183,7 @@ Heading = Annotated[
         title="North is",
         metavar="known|unknown|DEGREES",
         advanced=True,
+        panel=KNOW,
     ),
 ]
 OnGrid = Annotated[
@@ -176,6 +193,7 @@ OnGrid = Annotated[
         "anywhere in it.",
         title="From the centres of cells",
         advanced=True,
+        panel=SEARCH,
     ),
 ]
 Refine = Annotated[
@@ -185,6 +203,7 @@ Refine = Annotated[
         title="Search between the centres of cells",
         default="where there are street objects and bearings",
         advanced=True,
+        panel=SEARCH,
     ),
 ]
 SurelyHere = Annotated[
@@ -194,6 +213,7 @@ SurelyHere = Annotated[
         "are from elsewhere is 50 % before their objects are compared.",
         title="Surely from this area",
         advanced=True,
+        panel=KNOW,
     ),
 ]
 Smooth = Annotated[
@@ -216,6 +236,7 @@ Objects = Annotated[
         default="the store of the database",
         reads=True,
         advanced=True,
+        panel=SEARCH,
     ),
 ]
 
@@ -260,7 +281,8 @@ class QueryOptions:
         Option(
             "Symbols clockwise from north, such as DDBL; ? where one is unknown.",
             title="Types",
-            metavar="SYMBOLS",
+            metavar="LETTERS",
+            panel=SAW,
         ),
     ] = None
     bearings: Annotated[
@@ -269,6 +291,7 @@ class QueryOptions:
             "Degrees clockwise from north, such as 10,80,200,310.",
             title="Bearings",
             metavar="DEGREES,...",
+            panel=SAW,
         ),
     ] = None
     ranges: Annotated[
@@ -278,6 +301,7 @@ class QueryOptions:
             title="Rough distances",
             metavar="METRES,...",
             advanced=True,
+            panel=SAW,
         ),
     ] = None
     fov: Annotated[
@@ -289,6 +313,7 @@ class QueryOptions:
             low=0.001,
             high=360,
             advanced=True,
+            panel=SAW,
         ),
     ] = None
     look: Annotated[
@@ -300,6 +325,7 @@ class QueryOptions:
             low=-360,
             high=360,
             advanced=True,
+            panel=SAW,
         ),
     ] = None
     sectors: Annotated[
@@ -309,6 +335,7 @@ class QueryOptions:
             title="Sectors",
             metavar="DEGREES-DEGREES,...",
             advanced=True,
+            panel=SAW,
         ),
     ] = None
     north: NorthName = "grid"
@@ -379,6 +406,7 @@ class SearchOptions:
             title="A cell must see",
             metavar="CONDITION",
             advanced=True,
+            panel=KNOW,
         ),
     ] = None
     noise: Annotated[
@@ -392,6 +420,7 @@ class SearchOptions:
             "full turn with scores, otherwise generic",
             reads=True,
             suggestions=noises,
+            panel=SEARCH,
         ),
     ] = None
     map_age: MapAge = 0.0
@@ -404,7 +433,8 @@ class SearchOptions:
             "Last known place, in degrees or as X,Y,SIGMA in the CRS of the database, SIGMA in "
             "metres.",
             title="Last known place",
-            metavar="LAT,LON,SIGMA",
+            metavar="LATITUDE,LONGITUDE,METRES",
+            panel=KNOW,
         ),
     ] = None
     area: Annotated[
@@ -414,6 +444,7 @@ class SearchOptions:
             title="Area",
             metavar="WEST,SOUTH,EAST,NORTH|FILE",
             reads=True,
+            panel=KNOW,
         ),
     ] = None
     popularity: Annotated[
@@ -423,6 +454,7 @@ class SearchOptions:
             title="Popularity of places",
             reads=True,
             advanced=True,
+            panel=KNOW,
         ),
     ] = None
     rule: Annotated[
@@ -433,6 +465,7 @@ class SearchOptions:
             default="from a chance of 0.9",
             reads=True,
             advanced=True,
+            panel=SEARCH,
         ),
     ] = None
     surely_here: SurelyHere = False

@@ -37,9 +37,13 @@ class NumberRecord(TypedDict):
 @command(
     "reproduce",
     title="Repeat the paper's experiments",
-    group="Accuracy",
-    order=4,
+    group="Research",
+    order=3,
     returns=list[NumberRecord],
+    examples=(
+        "semsig reproduce --out paper --size small",
+        "semsig reproduce city.parquet --out paper --queries 1000",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Reproduce:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.commands.model import SAW, Option, Reporter, Result, command
 from semsig_gis.commands.options import (
     Database,
     Day,
@@ -49,6 +49,7 @@ class _Views:
             "for each view.",
             title="GPX track",
             reads=True,
+            panel=SAW,
         ),
     ] = None
     north: NorthName = "grid"
@@ -58,9 +59,13 @@ class _Views:
 @command(
     "route",
     title="Localize a route",
-    group="Localization",
-    order=2,
+    group="Ask",
+    order=4,
     returns="semsig_gis.output:RouteRecord",
+    examples=(
+        "semsig route city.parquet views.jsonl",
+        "semsig route city.parquet views.jsonl --track walk.gpx",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Route(SearchOptions, _Views):

@@ -27,7 +27,17 @@ TYPES = {bool: "boolean", int: "integer", float: "number", str: "string", Path: 
 Schemas = TypedDict("Schemas", {"$schema": str, "commands": dict[str, dict[str, Any]]})
 
 
-@command("schema", title="Schema of the commands", group="Results", order=9, returns=Schemas)
+@command(
+    "schema",
+    title="Schema of the commands",
+    group="Research",
+    order=4,
+    returns=Schemas,
+    examples=(
+        "semsig schema",
+        "semsig schema localize evaluate",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Schema:
     """Print the JSON Schema of the requests and results of all commands, or of some.

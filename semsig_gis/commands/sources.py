@@ -69,9 +69,13 @@ class CatalogDetails(TypedDict):
 @command(
     "sources",
     title="Catalogues of open data",
-    group="Street objects",
+    group="Prepare",
     order=3,
     returns=CatalogList | CatalogDetails,
+    examples=(
+        "semsig sources",
+        "semsig sources openstreetmap --tables",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Sources:

@@ -15,9 +15,13 @@ if TYPE_CHECKING:
 @command(
     "suggest",
     title="Suggest what to look for",
-    group="Localization",
+    group="Ask",
     order=3,
     returns="semsig_gis.output:SuggestRecord",
+    examples=(
+        "semsig suggest city.parquet 'bench at 40, lamp at 80'",
+        "semsig suggest city.parquet 'bus stop, bench' --near 43.73,7.42,200",
+    ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Suggest(SearchOptions, QueryOptions):

@@ -19,7 +19,17 @@ class Synthesized(TypedDict):
     files: list[str]
 
 
-@command("synthesize", title="Make up a city", group="Street objects", order=5, returns=Synthesized)
+@command(
+    "synthesize",
+    title="Make up a city",
+    group="Prepare",
+    order=10,
+    returns=Synthesized,
+    examples=(
+        "semsig synthesize --out town --size 1000",
+        "semsig synthesize --out paris",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Synthesize:
     """Make up a city: street objects, buildings and streets."""

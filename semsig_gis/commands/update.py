@@ -31,7 +31,17 @@ class Updated(TypedDict):
     years: NotRequired[float]
 
 
-@command("update", title="Update signature database", group="Databases", order=2, returns=Updated)
+@command(
+    "update",
+    title="Update signature database",
+    group="Prepare",
+    order=6,
+    returns=Updated,
+    examples=(
+        "semsig update city.parquet --objects new_trees.parquet",
+        "semsig update city.parquet --objects new.parquet --out new_city.parquet",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Update:
     """Apply changed street objects to a database."""

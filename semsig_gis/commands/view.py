@@ -54,7 +54,17 @@ class ViewCounts(TypedDict):
     unknown_files: list[str]
 
 
-@command("view", title="Views from detections", group="Detectors", order=1, returns=ViewCounts)
+@command(
+    "view",
+    title="Views from detections",
+    group="Ask",
+    order=5,
+    returns=ViewCounts,
+    examples=(
+        "semsig view boxes.json --fov 70 --out views.jsonl",
+        "semsig view photos --detector yolo.onnx --out views.jsonl",
+    ),
+)
 @dataclass(frozen=True, kw_only=True)
 class Views:
     """Turn the boxes of an object detector into views for semsig localize."""
