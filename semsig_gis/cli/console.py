@@ -266,10 +266,16 @@ def progress(
 
     duration_said.clear()
 
+    first: list[tuple[float, int]] = []
+
     def advance(completed: int, total: int) -> None:
-        passed = time.perf_counter() - start
-        if total > completed > 0 and passed >= MEASURED_S and not duration_said.is_set():
-            left = passed * (total - completed) / completed
+        # Measured from the first part, which may take longer than the others.
+        now = time.perf_counter()
+        if not first:
+            first.append((now, completed))
+        began, before = first[0]
+        if completed > before and now - began >= MEASURED_S and not duration_said.is_set():
+            left = (now - began) * (total - completed) / (completed - before)
             if left > LONG_S:
                 duration_said.set()
                 remark(f"{label} takes {duration(left)} more")

@@ -142,17 +142,17 @@ def test_long_work_is_estimated_once(
     now = 0.0
     monkeypatch.setattr(console.time, "perf_counter", lambda: now)
     with console.progress("working") as advance:
-        for now, completed in ((0.5, 1), (2.0, 2), (3.0, 3), (5.0, 4)):  # noqa: B007 - the clock
+        for now, completed in ((90.0, 1), (90.5, 2), (92.0, 3), (95.0, 4)):  # noqa: B007 - the clock
             advance(completed, 200)
     assert capsys.readouterr().err == "semsig: working takes about 3 minutes more\n"
     now = 0.0
     with console.progress("working") as advance:
-        for now, completed in ((2.0, 100), (4.0, 200)):  # noqa: B007
+        for now, completed in ((2.0, 100), (4.0, 150), (5.0, 200)):  # noqa: B007
             advance(completed, 200)
     with console.progress("working") as advance:
         console.duration_said.set()  # by a warning
-        now = 9.0
-        advance(1, 200)
+        for now, completed in ((1.0, 1), (9.0, 2)):  # noqa: B007
+            advance(completed, 200)
     assert capsys.readouterr().err == ""
 
 
