@@ -37,6 +37,7 @@ MOST_RANGE_ERROR = 3.0
 ROUNDING = 1e-6  # tolerance of sums of scores
 EDGE = 0.05  # degrees; tolerance for bearings and sectors that were rounded before
 CLASSES = MAX_CODE + 1
+COLUMNS = ("ranges", "range_errors", "bearing_errors", "scores", "photo")
 
 Sector = tuple[float, float]
 """From one bearing clockwise to another, in degrees; the second may be 360 or more."""
@@ -54,9 +55,11 @@ class ViewRecord(SignatureRecord, PhotoRecord):
 
     ranges: NotRequired[list[float | None]]
     range_errors: NotRequired[list[float | None]]
+    bearing_errors: NotRequired[list[float | None]]
     scores: NotRequired[list[dict[str, float]]]
     photos: NotRequired[list[PhotoRecord]]
     photo: NotRequired[list[int]]
+    notes: NotRequired[list[str]]
 
 
 def check_north(north_sigma: float) -> None:
@@ -195,6 +198,9 @@ class View(Signature):
     range_errors : ndarray of float64, shape (n,), or None
         Relative error of each distance, the standard deviation of its logarithm, above 0 and up to
         3; NaN for that of the noise model.
+    bearing_errors : ndarray of float64, shape (n,), or None
+        Error of each bearing in degrees in addition to that of the noise model, a standard
+        deviation above 0 and up to 180; NaN for none. Distances ignore it.
     scores : ndarray of float64, shape (n, 256), or None
         The probability of each class code for each object, by the detector; each row sums to one.
         Code 0 is for any class.
@@ -202,6 +208,8 @@ class View(Signature):
         Number of the photo of each object; 0 by default.
     photos : tuple of Photo, default one full turn
         The photos, each with its own error of north.
+    notes : tuple of str, optional
+        Remarks on how the view was read, for the notes of its answers.
 
     Raises
     ------
@@ -218,13 +226,15 @@ class View(Signature):
 
     ranges: NDArray[np.float64] | None = None
     range_errors: NDArray[np.float64] | None = None
+    bearing_errors: NDArray[np.float64] | None = None
     scores: NDArray[np.float64] | None = None
     photo: NDArray[np.int64] | None = None
     photos: tuple[Photo, ...] = (FULL_VIEW,)
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:  # noqa: D105
         super().__post_init__()
-        for name in ("ranges", "range_errors", "scores", "photo"):
+        for name in COLUMNS:
             value = getattr(self, name)
             if value is not None:
                 kind = np.int64 if name == "photo" else np.float64
@@ -243,15 +253,19 @@ class View(Signature):
             raise InputError(
                 "a view with ranges or sectors needs the bearings of its objects; give them."
             )
-        shapes = {"ranges": (), "range_errors": (), "photo": (), "scores": (CLASSES,)}
-        for name, rest in shapes.items():
-            value = getattr(self, name)
+        for name in COLUMNS:
+            value, rest = getattr(self, name), (CLASSES,) if name == "scores" else ()
             if value is not None and value.shape != (len(self), *rest):
                 raise InputError(
                     f"{len(value)} {name.replace('_', ' ')} were given for {len(self)} objects; "
                     "give one for each."
                 )
-        for name, most in (("ranges", MAX_RANGE_M), ("range_errors", MOST_RANGE_ERROR)):
+        limits = {
+            "ranges": MAX_RANGE_M,
+            "range_errors": MOST_RANGE_ERROR,
+            "bearing_errors": FULL_TURN / 2.0,
+        }
+        for name, most in limits.items():
             value = getattr(self, name)
             if value is not None and len(
                 bad := value[~(np.isnan(value) | (value > 0)) | (value > most)]
@@ -311,9 +325,11 @@ class View(Signature):
             column("bearings", math.nan),
             ranges=column("ranges", math.nan),
             range_errors=column("range_errors", math.nan),
+            bearing_errors=column("bearing_errors", math.nan),
             scores=np.concatenate(shares) if scored else None,
             photo=np.concatenate(rows),
             photos=tuple(photo for part in parts for photo in part.photos),
+            notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
         )
 
     @property
@@ -355,10 +371,11 @@ class View(Signature):
 
     def select(self, objects: NDArray[np.bool_ | np.int64]) -> View:
         """Return the view with a selection of its objects, by row numbers or a mask."""
-        names = ("codes", "bearings", "ranges", "range_errors", "scores", "photo")
+        names = ("codes", "bearings", *COLUMNS)
         values = {name: getattr(self, name) for name in names}
         rows = {name: None if value is None else value[objects] for name, value in values.items()}
-        return View(rows.pop("codes"), rows.pop("bearings"), **rows, photos=self.photos)
+        codes, bearings = rows.pop("codes"), rows.pop("bearings")
+        return View(codes, bearings, **rows, photos=self.photos, notes=self.notes)
 
     def turned(self, degrees: float) -> View:
         """Return the view with `degrees` added to its bearings, sorted clockwise."""
@@ -372,7 +389,7 @@ class View(Signature):
     def to_dict(self, taxonomy: Taxonomy) -> ViewRecord:
         """Return the values of `Signature.to_dict` and the details, for JSON and `parse_view`.
 
-        ``ranges`` and ``range_errors`` have None for unknown values; ``scores`` are by name of the
+        ``ranges`` and the errors have None for unknown values; ``scores`` are by name of the
         class. The values of `Photo.to_dict` are on the same level for one photo; for several
         photos, they are in ``photos``, and ``photo`` has the number of the photo of each object.
         """
@@ -384,12 +401,16 @@ class View(Signature):
             values["ranges"] = _none_for_nan(self.ranges)
         if self.range_errors is not None:
             values["range_errors"] = _none_for_nan(self.range_errors)
+        if self.bearing_errors is not None:
+            values["bearing_errors"] = _none_for_nan(self.bearing_errors)
         if self.scores is not None:
             names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: "unknown"}
             values["scores"] = [
                 {names[code]: float(row[code]) for code in np.flatnonzero(row).tolist()}
                 for row in self.scores
             ]
+        if self.notes:
+            values["notes"] = [*self.notes]
         if len(self.photos) == 1:
             return {**values, **self.photos[0].to_dict()}
         values["photos"] = [photo.to_dict() for photo in self.photos]

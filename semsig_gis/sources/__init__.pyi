@@ -15,6 +15,7 @@ from .catalog import paper_taxonomy as paper_taxonomy
 from .class_keywords import Keywords as Keywords
 from .class_keywords import Match as Match
 from .class_keywords import class_code as class_code
+from .class_keywords import class_words as class_words
 from .class_keywords import keywords as keywords
 from .class_keywords import words_of as words_of
 from .clip import BOX as BOX

@@ -153,8 +153,7 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
     text = word.strip()
     if len(text) == 1:
         return int(taxonomy.encode(text)[0])
-    # Equal taxonomies may have different titles.
-    class_words = _class_words(tuple((c.code, c.name, c.title) for c in taxonomy.classes))
+    words = _class_words(class_words(taxonomy))
     code: int | None
     if "=" in text:
         key, _, value = (part.strip() for part in text.partition("="))
@@ -165,9 +164,9 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
         joined = "".join(words_of(text))
         # The word itself, then its singular.
         forms = [joined.removesuffix(suffix) for suffix in ("", "s", "es")]
-        code = next((class_words[form][0] for form in forms if form in class_words), None)
+        code = next((words[form][0] for form in forms if form in words), None)
     if code is None:
-        near = nearest_name(text, (name for _, name in class_words.values()))
+        near = nearest_name(text, (name for _, name in words.values()))
         raise UnknownNameError(
             f"class {word!r} is unknown{near}; `semsig info` lists the classes of a city, and "
             "`semsig sources` those of a catalogue."
@@ -184,33 +183,31 @@ def _content() -> dict[str, Any]:
     return tomllib.loads((data_folder() / "keywords.toml").read_text(encoding="utf-8"))
 
 
-@functools.lru_cache(maxsize=8)
-def _class_words(classes: tuple[tuple[int, str, str], ...]) -> Mapping[str, tuple[int, str]]:
-    """Return class code and original word by normalized word (lower case, no blanks).
+def class_words(taxonomy: Taxonomy) -> tuple[tuple[str, int, str], ...]:
+    """Return the words for the classes, each with its language and class code.
 
-    `classes` are codes, names and titles.
+    The language of names and titles is empty, because they may be in any.
     """
     lists = _content()["classes"]
-    others = [
-        (key, code, word)
-        for code, name, _ in classes
-        for key, words in lists.get(name, {}).items()
-        if key != "fields"
-        for word in words
-    ]
-    # English has priority over the other languages.
-    others.sort(key=lambda item: item[0] not in {"en", SPOKEN})
-    pairs = [
-        *((code, name.replace("_", " ")) for code, name, _ in classes),
-        *((code, title) for code, _, title in classes),
-        (WILDCARD, "unknown"),
-        *((code, word) for _, code, word in others),
-    ]
-    class_words: dict[str, tuple[int, str]] = {}
-    for code, word in pairs:
+    words = [("", WILDCARD, "unknown")]
+    for item in taxonomy.classes:
+        words += [("", item.code, item.name.replace("_", " ")), ("", item.code, item.title)]
+        by_language = dict(lists.get(item.name, {}))
+        for by_key in (by_language.pop(SPOKEN, {}), by_language):
+            for key, phrases in by_key.items():
+                words += [(key, item.code, phrase) for phrase in phrases if key != "fields"]
+    return tuple(words)
+
+
+@functools.lru_cache(maxsize=8)
+def _class_words(classes: tuple[tuple[str, int, str], ...]) -> Mapping[str, tuple[int, str]]:
+    """Return class code and original word by normalized word (lower case, no blanks)."""
+    found: dict[str, tuple[int, str]] = {}
+    # Names and titles have priority, then English.
+    for _, code, word in sorted(classes, key=lambda item: (item[0] != "", item[0] != "en")):
         if joined := "".join(words_of(word)):
-            class_words.setdefault(joined, (code, word))
-    return class_words
+            found.setdefault(joined, (code, word))
+    return found
 
 
 @functools.cache

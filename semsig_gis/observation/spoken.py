@@ -1,0 +1,405 @@
+"""Sentences of a person: what was seen where, and what is not there.
+
+A sentence is split into items (things, directions, numbers, ...), each the longest phrase that the
+vocabulary has. The items between commas, and words such as "and", are a part, with one thing.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core import FULL_TURN, WILDCARD, InputError, UnknownNameError
+from semsig_gis.observation.vocabulary import LONGEST, Vocabulary
+from semsig_gis.sources import class_code
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.storage import Row
+
+Codes = tuple[int, ...]
+
+# Standard deviations in degrees of directions in words, which are uniform to either side.
+SIDE_ERROR = 26.0
+"""Left, right, ahead and behind: up to 45 degrees."""
+POINT_ERROR = 13.0
+"""The eight points of the compass, and between two sides: up to 22.5 degrees."""
+FINE_POINT_ERROR = 6.5
+"""The eight points between them: up to 11.25 degrees."""
+HOUR_ERROR = 8.7
+"""An hour on a clock: up to 15 degrees."""
+
+RIGHT, BACK, HOURS = 90.0, 180.0, 12
+MOST_COUNT = 20
+UNITS = frozenset({"metres", "degrees", "hours"})
+SEPARATORS = frozenset({"end", "also"})
+ADJECTIVES_FIRST = frozenset({"en", "de"})
+"""Languages in which a word after a thing makes another thing of it, such as "tree stump"."""
+
+_TOKEN = re.compile(
+    r"(?P<tag>[\w:]+ ?= ?[\w:*]+)"
+    r"|(?P<number>(?<!\w)[-+]?\d+(?:\.\d+)?|\d+(?:\.\d+)?)"
+    r"|(?P<word>[^\W\d_]+(?:_[^\W\d_]+)*|[°@?])"
+    r"|(?P<end>[,;\n])"
+)
+_DIRECTIONS = (
+    "give degrees (at 40, 20 left), a compass point (NE), a time on a clock (3 o'clock), left, "
+    "right, ahead or behind"
+)
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Sentence:
+    """What a sentence says.
+
+    `row` has the objects as ``detections`` of `parse_view`, ``notes`` on what was not used, and the
+    ``heading`` with its error if the sentence gives it. `unplaced` and `absent` are the class codes
+    of objects that were seen in an unknown direction, if others have one, and of those that are not
+    in sight.
+    """
+
+    row: Row
+    unplaced: Codes = ()
+    absent: Codes = ()
+
+
+def read_sentence(text: str, taxonomy: Taxonomy) -> Sentence:
+    """Return what a person's sentence says.
+
+    Parameters
+    ----------
+    text : str
+        What was seen, in English, German, French, Spanish, Italian or Portuguese.
+    taxonomy : Taxonomy
+        The classes.
+
+    Returns
+    -------
+    Sentence
+        The objects; without any direction, all are in its row.
+
+    Raises
+    ------
+    UnknownNameError
+        If a part names no class.
+    InputError
+        If something else in a part is not understood.
+
+    Examples
+    --------
+    >>> from semsig_gis import paper_taxonomy
+    >>> sentence = read_sentence("2 green benches on the left, a lamp, no tree", paper_taxonomy())
+    >>> [(item["class"], item["offset"]) for item in sentence.row["detections"]]
+    [('L', -90.0), ('L', -90.0)]
+    >>> sentence.unplaced, sentence.absent, sentence.row["notes"]
+    ((3,), (1,), ["'green' was not used."])
+    """
+    tokens = [*_TOKEN.finditer(text.replace("º", "°"))]
+    vocabulary = Vocabulary.of([match["word"] for match in tokens if match["word"]], taxonomy)
+    look: Row = {}
+    things: list[_Part] = []
+    waiting: _Part | None = None  # a direction before its thing
+    for part in _parts(_items(tokens, vocabulary, taxonomy), vocabulary):
+        if part.heading is not None:
+            look = {"heading": part.heading, "heading_error": POINT_ERROR}
+        last = things[-1] if things else None
+        if part.codes:
+            part.check(vocabulary, last)
+            if waiting is not None:
+                part.take(waiting)
+                waiting = None
+            things.append(part)
+        elif part.others or part.absent:
+            raise _unknown_class(part, vocabulary, taxonomy)
+        elif last is not None and part.says_where and last.can_take(part):
+            last.take(part)
+        elif part.says_where:
+            waiting = part
+    if waiting is not None:
+        raise InputError(f"{waiting.text!r} does not say what is there; name the thing.")
+    return _sentence(things, look, taxonomy)
+
+
+def _sentence(things: Sequence[_Part], look: Row, taxonomy: Taxonomy) -> Sentence:
+    """Return what the things of a sentence say; `look` has the direction of sight."""
+    seen = [(thing, thing.place()) for thing in things if not thing.absent]
+    rows: list[Row] = [
+        {"class": taxonomy.decode(thing.codes), **place, "range": thing.range}
+        for thing, place in seen
+        if place
+        for _ in range(thing.count)
+    ]
+    others = [thing for thing, place in seen if not place]
+    unplaced = [code for thing in others for code in thing.codes * thing.count]
+    if not rows:
+        rows, unplaced = [{"class": taxonomy.decode([code])} for code in unplaced], []
+    notes = [f"{word!r} was not used." for thing in things for word in thing.others]
+    notes += [
+        f"the distance in {thing.text!r} was not used, because it has no direction."
+        for thing in others
+        if thing.range is not None
+    ]
+    return Sentence(
+        row={"detections": rows, "notes": notes, **look},
+        unplaced=tuple(unplaced),
+        absent=tuple(code for thing in things if thing.absent for code in thing.codes),
+    )
+
+
+def _unknown_class(part: _Part, vocabulary: Vocabulary, taxonomy: Taxonomy) -> UnknownNameError:
+    word = " ".join(part.others) or part.text
+    legend = ", ".join(item.title.lower() for item in taxonomy.classes)
+    return UnknownNameError(
+        f"class {word!r} is unknown{vocabulary.nearest(word)}; give a word for one of these: "
+        f"{legend}."
+    )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Item:
+    """A phrase of a sentence, with a kind of the vocabulary or one of these.
+
+    A "thing", a "symbol" of a class, a "number", an "other" word, or the "end" of a part.
+    """
+
+    kind: str
+    value: Any
+    text: str
+
+
+def _items(
+    tokens: Sequence[re.Match[str]], vocabulary: Vocabulary, taxonomy: Taxonomy
+) -> Iterator[_Item]:
+    """Yield the longest phrases and things, from left to right."""
+    symbols = {item.symbol: item.code for item in taxonomy.classes} | {"?": WILDCARD}
+    place, first = 0, True  # whether a symbol may come next
+    while place < len(tokens):
+        token, text, size = tokens[place], tokens[place].group(), 1
+        if token["end"]:
+            item = _Item("end", None, text)
+        elif token["number"]:
+            item = _Item("number", float(text), text)
+        elif token["tag"]:
+            item = _Item("thing", class_code(text, taxonomy), text)
+        elif first and text in symbols:
+            item = _Item("symbol", symbols[text], text)
+        else:
+            following = tokens[place : place + LONGEST]
+            words = itertools.takewhile(bool, (other["word"] for other in following))
+            size, item = _phrase([*words], vocabulary)
+        yield item
+        first = item.kind in SEPARATORS or (first and item.kind in {"skip", "number", "none"})
+        place += size
+
+
+def _phrase(words: Sequence[str], vocabulary: Vocabulary) -> tuple[int, _Item]:
+    """Return the longest phrase or thing at the beginning of some words, and its length."""
+    for size in range(len(words), 0, -1):
+        text = " ".join(words[:size])
+        if (code := vocabulary.class_of(words[:size])) is not None:
+            return size, _Item("thing", code, text)
+        if meaning := vocabulary.meaning(words[:size]):
+            return size, _Item(*meaning, text)
+    return 1, _Item("other", None, words[0])
+
+
+def _parts(items: Iterable[_Item], vocabulary: Vocabulary) -> Iterator[_Part]:
+    """Yield the parts of a sentence."""
+    joined, group = False, list[_Item]()
+    for item in (*items, _Item("end", None, "")):
+        if item.kind not in SEPARATORS:
+            group.append(item)
+            continue
+        if group:
+            yield _part(group, vocabulary, joined=joined)
+        joined, group = item.kind == "also", []
+
+
+def _part(items: list[_Item], vocabulary: Vocabulary, *, joined: bool) -> _Part:
+    """Collect the items of a part."""
+    part = _Part(text=" ".join(item.text for item in items), joined=joined)
+    named = any(item.kind == "thing" for item in items)
+    before, within = "", ""
+    while items:
+        item, *items = items
+        if item.kind == "symbol" and named:  # a letter before a thing: "a bench"
+            _, item = _phrase([item.text], vocabulary)
+        if item.kind == "number":
+            unit = items[0].kind if items else ""
+            if unit in UNITS:
+                del items[0]
+            else:
+                unit = part.unit(item, before, items)
+            item = replace(item, kind=unit)
+        elif item.kind in UNITS:
+            item = replace(item, kind="other")
+        match item.kind:
+            case "thing" | "symbol":
+                part.codes.append(item.value)
+                part.words.append((part.run, item))
+            case "other":
+                part.words.append((part.run, item))
+            case "count":
+                part.count = int(item.value)
+            case "within":
+                within = "within "
+            case "metres":
+                part.range = f"{within}{item.value:g} m"
+            case "skip":
+                pass
+            case _:
+                part.add(item)
+        before = item.kind
+    return part
+
+
+@dataclass(eq=False, slots=True, kw_only=True)
+class _Part:
+    """A part of a sentence about one thing.
+
+    `words` are those for things and those without a meaning, each with the number of its run, which
+    ends at a direction. `points`, `turns`, `hours` and `degrees` are directions; `heading` is the
+    direction of sight. `joined` is whether the part follows a word such as "and".
+    """
+
+    text: str
+    joined: bool
+    codes: list[int] = field(default_factory=list)
+    count: int = 1
+    absent: bool = False
+    facing: bool = False
+    heading: float | None = None
+    points: list[float] = field(default_factory=list)
+    turns: list[float] = field(default_factory=list)
+    hours: list[float] = field(default_factory=list)
+    degrees: list[float] = field(default_factory=list)
+    range: str | None = None
+    words: list[tuple[int, _Item]] = field(default_factory=list)
+    run: int = 0
+
+    @property
+    def others(self) -> list[str]:
+        """Words without a meaning."""
+        return [item.text for _, item in self.words if item.kind == "other"]
+
+    @property
+    def directed(self) -> bool:
+        """Whether it has a direction."""
+        return bool(self.points or self.turns or self.hours or self.degrees)
+
+    @property
+    def says_where(self) -> bool:
+        """Whether it has a direction or a distance."""
+        return self.directed or self.range is not None
+
+    def can_take(self, other: _Part) -> bool:
+        """Return whether another part without a thing says something new about this thing."""
+        return not (
+            self.absent
+            or (self.directed and other.directed)
+            or (self.range is not None and other.range is not None)
+        )
+
+    def take(self, other: _Part) -> None:
+        """Add the direction and the distance of another part."""
+        self.text += f", {other.text}"
+        for name in ("points", "turns", "hours", "degrees"):
+            getattr(self, name).extend(getattr(other, name))
+        self.range = self.range or other.range
+
+    def unit(self, number: _Item, before: str, following: Sequence[_Item]) -> str:
+        """Return the unit of a number without one: hours, degrees or a count of things."""
+        after = next((item.kind for item in following if item.kind not in {"skip", "at"}), "")
+        if before == "clock":
+            return "hours"
+        if before == "at" or after == "turn":
+            return "degrees"
+        whole = number.value.is_integer() and 1 <= number.value <= MOST_COUNT
+        if whole and not self.codes and after in {"thing", "symbol", "other"}:
+            return "count"
+        if before == "turn":
+            return "degrees"
+        raise InputError(
+            f"the number {number.text} in {self.text!r} is not clear; write 'at 40' or '40 left' "
+            f"for degrees, '40 m' for metres, or '4 benches', up to {MOST_COUNT}."
+        )
+
+    def add(self, item: _Item) -> None:
+        """Add a direction or another phrase that ends a run of words."""
+        self.run += 1
+        match item.kind:
+            case "none":
+                self.absent = True
+            case "facing":
+                self.facing = True
+            case "range":
+                self.range = self.range or item.value
+            case "compass" | "degrees" if self.facing and self.heading is None:
+                self.heading = item.value
+            case "compass":
+                self.points.append(item.value)
+            case "turn":
+                self.turns.append(item.value)
+            case "hours":
+                self.hours.append(item.value)
+            case "degrees":
+                self.degrees.append(item.value)
+
+    def check(self, vocabulary: Vocabulary, last: _Part | None) -> None:
+        """Raise InputError for words that are not understood, or for several things."""
+        runs = {run for run, item in self.words if item.kind != "other"}
+        strange = [item.text for run, item in self.words if run not in runs]
+        if vocabulary.language in ADJECTIVES_FIRST:
+            strange += [
+                word.text
+                for (run, item), (next_run, word) in itertools.pairwise(self.words)
+                if run == next_run and item.kind != "other" and word.kind == "other"
+            ]
+        if strange:
+            raise InputError(
+                f"{' '.join(strange)!r} in {self.text!r} is not understood; {_DIRECTIONS}."
+            )
+        if len(self.codes) > 1 and not self.absent:
+            raise InputError(
+                f"{self.text!r} names several things; put a comma between them, and give each its "
+                "own direction."
+            )
+        if self.absent and self.says_where:
+            raise InputError(
+                f"{self.text!r} says where something is not; say only what is nowhere in sight."
+            )
+        if self.joined and last is not None and last.absent and not (self.absent or self.directed):
+            raise InputError(
+                f"{self.text!r} follows {last.text!r}; say 'no' before each thing that is not in "
+                "sight, or put a comma before one that is."
+            )
+
+    def place(self) -> Row:
+        """Return the direction as values of a detection; empty without any."""
+        points, turns, degrees = self.points, self.turns, self.degrees
+        match len(turns), len(degrees), len(points), len(self.hours):
+            case 0, 0, 0, 0:
+                return {}
+            case 0, 1, 0, 0:
+                return {"bearing": degrees[0]}
+            case 1, 1, 0, 0 if abs(turns[0]) == RIGHT:
+                return {"offset": degrees[0] * turns[0] / RIGHT}
+            case 1, 0, 0, 0:
+                return {"offset": turns[0], "bearing_error": SIDE_ERROR}
+            case 2, 0, 0, 0 if sorted({abs(turn) == RIGHT for turn in turns}) == [False, True]:
+                along, side = sorted(turns, key=lambda turn: abs(turn) == RIGHT)
+                away = (along + RIGHT) / 2.0
+                return {"offset": math.copysign(away, side), "bearing_error": POINT_ERROR}
+            case 0, 0, 1, 0:
+                fine = points[0] % (RIGHT / 2.0) != 0
+                error = FINE_POINT_ERROR if fine else POINT_ERROR
+                return {"bearing": points[0], "bearing_error": error}
+            case 0, 0, 0, 1 if 1 <= self.hours[0] <= HOURS:
+                offset = self.hours[0] % HOURS * (FULL_TURN / HOURS)
+                return {"offset": offset, "bearing_error": HOUR_ERROR}
+        raise InputError(f"the direction in {self.text!r} is not clear; {_DIRECTIONS}.")

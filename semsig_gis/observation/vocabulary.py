@@ -1,0 +1,160 @@
+"""The words of people for things and directions, by language, from ``data_sources``."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import tomllib
+import unicodedata
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from semsig_gis.core import nearest_name
+from semsig_gis.sources import class_words, data_folder, words_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from semsig_gis.core import Taxonomy
+
+Kind = Literal[
+    "skip", "at", "none", "also", "facing", "degrees", "metres", "hours", "clock", "within",
+    "numbers", "turn", "compass", "range",
+]  # fmt: skip
+"""What a phrase says; see ``phrases.toml``."""
+LISTS = ("skip", "at", "none", "also", "facing", "degrees", "metres", "hours", "clock", "within")
+TABLES = ("numbers", "turn", "compass", "range")
+SHORT_WORD = 3
+"""Words up to this number of letters have no endings."""
+LONGEST = 6
+"""Words in the longest phrase."""
+
+Words = tuple[str, ...]
+Meaning = tuple[Kind, Any]
+
+
+def plain_word(word: str) -> str:
+    """Return a word in lower case and without accents.
+
+    >>> plain_word("Árbol"), plain_word("Straße")
+    ('arbol', 'strasse')
+    """
+    letters = unicodedata.normalize("NFKD", word.casefold())
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Vocabulary:
+    """The words of a language, then those of the other languages that have one meaning.
+
+    `classes` are class codes by the words of a thing, joined and in any form; `phrases` are
+    meanings by words, `letters` bearings by capitals, and `names` words for things of the language.
+    """
+
+    language: str
+    classes: Mapping[str, int]
+    phrases: Mapping[Words, Meaning]
+    letters: Mapping[str, float]
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, words: Sequence[str], taxonomy: Taxonomy) -> Vocabulary:
+        """Return the vocabulary of the language that knows most of the words, English first."""
+        known = class_words(taxonomy)
+        plain = [plain_word(word) for word in words]
+        languages = [*_phrases()]
+        counts = {name: sum(word in _known(known, name) for word in plain) for name in languages}
+        return _vocabulary(known, max(languages, key=counts.__getitem__))
+
+    def class_of(self, words: Sequence[str]) -> int | None:
+        """Return the class code for the words of a thing, None if they are for no class."""
+        names = [words_of(word) for word in words]
+        # A thing does not begin or end with an article.
+        if not names or not names[0] or not names[-1]:
+            return None
+        return self.classes.get("".join(itertools.chain(*names)))
+
+    def meaning(self, words: Sequence[str]) -> tuple[str, Any] | None:
+        """Return the kind and the value of a phrase, None if it has no meaning."""
+        (word, *more) = words
+        capitals = word.isupper() or (self.language == "en" and len(word) > 1)
+        if not more and capitals and (bearing := self.letters.get(word.upper())) is not None:
+            return "compass", bearing
+        kind, value = self.phrases.get(tuple(map(plain_word, words)), (None, None))
+        if kind is None:
+            return None
+        return ("number", float(value)) if kind == "numbers" else (kind, value)
+
+    def nearest(self, text: str) -> str:
+        """Return ``"; the nearest is 'x'"`` for the nearest word of the language, or nothing."""
+        return nearest_name(text, self.names)
+
+
+@functools.cache
+def _phrases() -> dict[str, dict[str, Any]]:
+    """Return the tables of ``phrases.toml`` by language."""
+    return tomllib.loads((data_folder() / "phrases.toml").read_text(encoding="utf-8"))
+
+
+@functools.cache
+def _meanings(language: str) -> dict[Words, Meaning]:
+    """Return the meaning of each phrase of a language."""
+    table = _phrases()[language]
+    pairs: list[tuple[str, Meaning]] = [
+        (phrase, (kind, None)) for kind in LISTS for phrase in table[kind]
+    ]
+    pairs += [(phrase, (kind, value)) for kind in TABLES for phrase, value in table[kind].items()]
+    return {tuple(phrase.split()): meaning for phrase, meaning in pairs}
+
+
+@functools.cache
+def _shared() -> dict[Words, Meaning]:
+    """Return the phrases that have the same meaning in all languages that have them."""
+    meanings: dict[Words, set[Meaning]] = {}
+    for language in _phrases():
+        for words, meaning in _meanings(language).items():
+            meanings.setdefault(words, set()).add(meaning)
+    return {words: next(iter(found)) for words, found in meanings.items() if len(found) == 1}
+
+
+def _forms(phrase: str, endings: Sequence[str]) -> set[str]:
+    """Return a word for a thing with each of its words in each form, joined."""
+    forms = [
+        [word, *(word + ending for ending in endings if len(word) > SHORT_WORD)]
+        for word in words_of(phrase)
+    ]
+    return {"".join(words) for words in itertools.product(*forms)} - {""}
+
+
+@functools.lru_cache(maxsize=64)
+def _vocabulary(known: tuple[tuple[str, int, str], ...], language: str) -> Vocabulary:
+    classes: dict[str, int] = {}
+    # All words as they are go before their forms, the own language before others.
+    for exact in (True, False):
+        for name in dict.fromkeys(["", language, *_phrases(), *(name for name, _, _ in known)]):
+            endings = () if exact else _phrases().get(name or "en", {}).get("endings", ())
+            for _, code, phrase in (item for item in known if item[0] == name):
+                for form in _forms(phrase, endings):
+                    classes.setdefault(form, code)
+    names = tuple(word for name, _, word in known if name in {"", language})
+    return Vocabulary(
+        language=language,
+        classes=classes,
+        phrases={**_shared(), **_meanings(language)},
+        letters=_phrases()[language]["letters"],
+        names=names,
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _known(known: tuple[tuple[str, int, str], ...], language: str) -> frozenset[str]:
+    """Return the single words of a language."""
+    endings = ["", *_phrases()[language]["endings"]]
+    things = {
+        word + ending
+        for name, _, phrase in known
+        if name == language
+        for word in map(plain_word, phrase.split())
+        for ending in endings
+    }
+    return frozenset(things.union(*_meanings(language)))
