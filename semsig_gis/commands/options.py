@@ -343,9 +343,35 @@ class QueryOptions:
 
     def query(self, dataset: SignatureDatabase | PartitionedDatabase, *, others: str = "") -> View:
         """Return the query of the options; `others` is for the message if there is none."""
-        from semsig_gis.observation import parse_view, text_row
+        if not (self.seen or "").strip() and self.types is None and self.bearings is None:
+            raise InputError(
+                "nothing was asked; say what was seen, such as 'bench at 40, lamp at 80', or give "
+                f"--types, --bearings or both{others}."
+            )
+        return self._seen(dataset)[0]
 
-        taxonomy = dataset.taxonomy
+    def usual_noise(self, query: View, taxonomy: Taxonomy) -> str:
+        """Return the default noise: "by-hand" for a view in words, since people leave out much."""
+        from semsig_gis.localization import usual_noise
+        from semsig_gis.observation import text_row
+
+        in_words = self.seen and self.types is None and "see" in text_row(self.seen, taxonomy)
+        return "by-hand" if in_words else usual_noise(query)
+
+    def unplaced(
+        self, dataset: SignatureDatabase | PartitionedDatabase
+    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Return the class codes of objects seen without a direction, and of absent objects."""
+        _, unplaced, absent = self._seen(dataset)
+        return unplaced, absent
+
+    def _seen(
+        self, dataset: SignatureDatabase | PartitionedDatabase
+    ) -> tuple[View, tuple[int, ...], tuple[int, ...]]:
+        """Return the query, and the class codes of undirected and of absent objects."""
+        from semsig_gis.observation import parse_seen, read_sentence, text_row
+
+        taxonomy, radius = dataset.taxonomy, dataset.spec.radius
         row: dict[str, Any] = {
             "types": self.types,
             "bearings": None if self.bearings is None else numbers(self.bearings, "--bearings"),
@@ -354,44 +380,19 @@ class QueryOptions:
             "heading": self.look,
             "sectors": self.sectors,
         }
-        if not (self.seen or "").strip() and self.types is None and self.bearings is None:
-            raise InputError(
-                "nothing was asked; say what was seen, such as 'bench at 40, lamp at 80', or give "
-                f"--types, --bearings or both{others}."
-            )
-        if sentence := self._sentence:
-            if self.types is not None:
+        absent: tuple[int, ...] = ()
+        if self.seen and self.types is not None:
+            sentence = read_sentence(self.seen, taxonomy)
+            if sentence.row["detections"]:
                 raise InputError(
                     f"{self.seen!r} was given with --types; describe what was seen in one "
                     "of these ways."
                 )
-            row |= text_row(sentence, taxonomy)
-        return parse_view(row, taxonomy=taxonomy, radius=dataset.spec.radius)
-
-    def usual_noise(self, query: View, taxonomy: Taxonomy) -> str:
-        """Return the default noise: "by-hand" for a view in words, since people leave out much."""
-        from semsig_gis.localization import usual_noise
-        from semsig_gis.observation import text_row
-
-        sentence = self._sentence
-        in_words = sentence and "see" in text_row(sentence, taxonomy)
-        return "by-hand" if in_words else usual_noise(query)
-
-    def unplaced(
-        self, dataset: SignatureDatabase | PartitionedDatabase
-    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the class codes of objects seen without a direction, and of absent objects."""
-        from semsig_gis.observation import unplaced_codes
-
-        _, unplaced, absent = unplaced_codes(self.seen or "", dataset.taxonomy)
-        return unplaced, absent
-
-    @property
-    def _sentence(self) -> str:
-        """Objects with directions from the text of the view, as one sentence."""
-        from semsig_gis.observation import unplaced_parts
-
-        return unplaced_parts(self.seen or "")[0]
+            absent = sentence.absent
+        elif self.seen:
+            row |= text_row(self.seen, taxonomy)
+        view, unplaced, more = parse_seen(row, taxonomy=taxonomy, radius=radius)
+        return view, unplaced, absent + more
 
 
 @dataclass(frozen=True, kw_only=True)

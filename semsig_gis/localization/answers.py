@@ -237,9 +237,9 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
 
     `present` are the class codes that occur in the database.
     """
+    notes = query.notes if isinstance(query, View) else ()
     if not len(query):
-        return ("nothing was seen, which says little about the place.",)
-    notes: tuple[str, ...] = ()
+        return ("nothing was seen, which says little about the place.", *notes)
     if isinstance(query, View) and query.bearings is not None and len(outside := query.outside()):
         symbols = "?" * len(query) if query.codes is None else taxonomy.decode(query.codes)
         listed = ", ".join(
@@ -249,7 +249,7 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
             f"{listed} {'is' if len(outside) == 1 else 'are'} outside the sectors that were looked "
             "at; the heading, the field of view or the bearing may be wrong."
         )
-        notes = (note,)
+        notes = (note, *notes)
     codes = [] if query.codes is None else query.codes[~query.among(present)].tolist()
     if not codes:
         return notes

@@ -43,10 +43,10 @@ from .sentences import GUESS_ERROR as GUESS_ERROR
 from .sentences import RADIUS_M as RADIUS_M
 from .sentences import SEEN as SEEN
 from .sentences import mappings as mappings
+from .sentences import parse_seen as parse_seen
 from .sentences import parse_view as parse_view
 from .sentences import text_row as text_row
-from .sentences import unplaced_codes as unplaced_codes
-from .sentences import unplaced_parts as unplaced_parts
+from .spoken import read_sentence as read_sentence
 from .track import read_track as read_track
 from .view import CLASSES as CLASSES
 from .view import FULL_VIEW as FULL_VIEW

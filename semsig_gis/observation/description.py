@@ -10,11 +10,9 @@ from semsig_gis.core import InputError, Signature, nearest_name
 from semsig_gis.observation.sentences import (
     RADIUS_M,
     SEEN,
-    parse_view,
+    parse_seen,
     text_row,
-    unplaced_codes,
 )
-from semsig_gis.storage import row_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -94,13 +92,7 @@ def read_description(view: AnyView, *, taxonomy: Taxonomy, radius: float = RADIU
         items = _items(view)
         row = {"detections": [_detection(item) for item in items]}
         in_words = not any(isinstance(item, Mapping) for item in items)
-    sentence = row_value(row, "see")
-    if sentence is None:
-        return Description(
-            view=parse_view(row, taxonomy=taxonomy, radius=radius), in_words=in_words
-        )
-    placed, unplaced, absent = unplaced_codes(str(sentence), taxonomy)
-    parsed = parse_view({**row, "see": placed}, taxonomy=taxonomy, radius=radius)
+    parsed, unplaced, absent = parse_seen(row, taxonomy=taxonomy, radius=radius)
     return Description(view=parsed, unplaced=unplaced, absent=absent, in_words=in_words)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from semsig_gis.core import InputError
 from semsig_gis.observation.leg import Leg
 from semsig_gis.observation.north import GRID_NORTH
-from semsig_gis.observation.sentences import RADIUS_M, parse_view, require_seen, unplaced_codes
+from semsig_gis.observation.sentences import RADIUS_M, parse_seen, parse_view, require_seen
 from semsig_gis.observation.track import STEP_ERROR_M, parse_time
 from semsig_gis.observation.view import View
 from semsig_gis.storage import file_rows, json_rows, parse_rows, read_rows, row_value, scan_rows
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Taxonomy
     from semsig_gis.observation.north import North
+    from semsig_gis.observation.spoken import Codes
     from semsig_gis.observation.track import Track
     from semsig_gis.storage import Row
 
 Route = tuple[list[tuple[str | int, View]], list[Leg]]
-Codes = tuple[int, ...]
 
 COORDINATE_KEYS = ("dx", "dy")
 POLAR_KEYS = ("distance", "bearing")
@@ -71,9 +71,7 @@ def _query_lines(
 ) -> Iterator[QueryLine]:
     def read(row: Row) -> tuple[View, Codes, Codes]:
         require_seen(row)
-        sentence, unplaced, absent = unplaced_codes(str(row_value(row, "see") or ""), taxonomy)
-        view = parse_view({**row, "see": sentence}, taxonomy=taxonomy, radius=radius)
-        return view, unplaced, absent
+        return parse_seen(row, taxonomy=taxonomy, radius=radius)
 
     for line, row, result in scan_rows(rows, source, read, what="query"):
         name = _name(row_value(row, "id"), line)

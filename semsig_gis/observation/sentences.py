@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from semsig_gis.core import (
     wrap_degrees,
     wrapped_bearings,
 )
+from semsig_gis.observation.spoken import read_sentence
 from semsig_gis.observation.view import CLASSES, ROUNDING, Photo, View
 from semsig_gis.sources import class_code
 from semsig_gis.storage import row_value
@@ -31,11 +33,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import Taxonomy
+    from semsig_gis.observation.spoken import Codes
     from semsig_gis.storage import Row
 
 SEEN = ("types", "bearings", "detections", "see", "photos")
 """Keys of a row that describe the observed objects; at least one is required."""
-COLUMNS = ("types", "bearings", "ranges", "range_errors", "scores", "photo")
+COLUMNS = ("types", "bearings", "bearing_errors", "ranges", "range_errors", "scores", "photo")
 LOOK = ("heading", "fov", "sectors", "heading_error")
 """Keys of a row that describe the direction of a photo."""
 
@@ -48,15 +51,6 @@ HEADING_ERRORS = {"known": 0.0, "unknown": math.inf}
 UNKNOWN = (None, "", "?", "nan")
 
 _NUMBER = r"[-+]?\d+(?:\.\d*)?"
-_PLACED = re.compile(
-    rf"""(?P<name>.*?\S)\s+(?:
-        (?:at\s+)?(?P<offset>{_NUMBER})\s*(?:°|deg(?:rees)?)?\s*(?P<side>left|right)
-        | (?P<ahead>ahead)
-        | (?:at\s+|@\s*)(?P<bearing>{_NUMBER})\s*(?:°|deg(?:rees)?\b)?
-    )(?:\s+(?P<range>.*\S))?""",
-    re.VERBOSE | re.IGNORECASE,
-)
-_ABSENT = re.compile(r"no\s+(?:other\s+)?(\S.*)", re.IGNORECASE)
 _METRES = re.compile(
     rf"(?P<within>within\s+)?(?:about\s+|~\s*)?(?P<metres>{_NUMBER})\s*(?:m|met(?:re|er)s?)?"
     r"(?:\s+away)?",
@@ -74,9 +68,10 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
     row : dict
         The observed objects, in one of these forms: ``types`` (symbols) and ``bearings`` (degrees),
         one of which may be missing, with ``ranges``, ``range_errors`` and ``scores``;
-        ``detections``, a list of mappings with ``class``, ``bearing`` or ``offset``, ``range`` and
-        ``range_error``; ``see``, a sentence; or ``photos``, a list of rows. In addition, the
-        direction of the photo: ``heading`` and ``fov``, or ``sectors``, and ``heading_error``.
+        ``detections``, a list of mappings with ``class``, ``bearing`` or ``offset``,
+        ``bearing_error``, ``range`` and ``range_error``; ``see``, a sentence (see `read_sentence`);
+        or ``photos``, a list of rows. In addition, the direction of the photo: ``heading`` and
+        ``fov``, or ``sectors``, and ``heading_error``.
         Other keys are ignored.
     taxonomy : Taxonomy
         The classes.
@@ -113,6 +108,25 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
     >>> view.codes.tolist(), view.bearings.tolist(), view.ranges.round(1).tolist()
     ([10, 3], [40.0, 80.0], [nan, 7.3])
     """
+    view, unplaced, absent = parse_seen(row, taxonomy=taxonomy, radius=radius)
+    if unplaced:
+        raise InputError(
+            f"{row['see']!r} has things with and without a direction, which is not accepted here; "
+            "give each thing a direction, or none of them."
+        )
+    if absent:
+        raise InputError(
+            f"{row['see']!r} says what is not in sight, which is not accepted here; leave it out."
+        )
+    return view
+
+
+def parse_seen(row: Row, *, taxonomy: Taxonomy, radius: float) -> tuple[View, Codes, Codes]:
+    """Return the view of a row as `parse_view` does, and what else its sentence says.
+
+    These are the class codes of objects that were seen in an unknown direction, if others have a
+    direction, and of objects that are not in sight.
+    """
     values = {name: value for name in row if (value := row_value(row, name)) is not None}
     lists = [name for name in ("detections", "see") if name in values]
     columns = [name for name in COLUMNS if name in values]
@@ -133,14 +147,28 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
                 "there are no photos, or objects in them have no bearing; give at least one photo, "
                 "and a bearing for each object."
             )
-        return views[0] if len(views) == 1 else View.joined(views).turned(0.0)
-    if lists:
-        if "see" in values:
-            detections = _sentence_detections(str(values["see"]))
-        else:
-            detections = mappings(values["detections"], "detections")
-        values |= _columns(detections, values, taxonomy)
-    return _columns_view(values, taxonomy, radius)
+        return (views[0] if len(views) == 1 else View.joined(views).turned(0.0)), (), ()
+    if "see" not in values:
+        if lists:
+            values |= _columns(mappings(values["detections"], "detections"), values, taxonomy)
+        return _columns_view(values, taxonomy, radius), (), ()
+    sentence = read_sentence(str(values["see"]), taxonomy)
+    if "heading" in values and "heading" in sentence.row:
+        raise InputError(
+            f"the direction of sight was given in {values['see']!r} and as a heading of "
+            f"{values['heading']}; give it once."
+        )
+    values = {**values, **sentence.row}
+    keys = {name for item in values["detections"] for name in ("bearing", "offset") if name in item}
+    if len(keys) > 1 and "heading" not in values:
+        raise InputError(
+            f"{values['see']!r} mixes directions from north (at 40, NE) with those from the "
+            "direction of sight (left, 3 o'clock); say where you look as well, such as "
+            "'facing north'."
+        )
+    values |= _columns(values["detections"], values, taxonomy)
+    view = replace(_columns_view(values, taxonomy, radius), notes=sentence.notes)
+    return view, sentence.unplaced, sentence.absent
 
 
 def text_row(text: str, taxonomy: Taxonomy) -> Row:
@@ -207,6 +235,7 @@ def _columns_view(values: Row, taxonomy: Taxonomy, radius: float) -> View:
         plain,
         ranges=ranges,
         range_errors=errors,
+        bearing_errors=_errors(values, "bearing_errors", len(plain)),
         scores=scores,
         photo=np.array(owners, np.int64) if "photo" in values else None,
         photos=tuple(photos),
@@ -216,7 +245,8 @@ def _columns_view(values: Row, taxonomy: Taxonomy, radius: float) -> View:
 def _columns(items: Sequence[Row], values: Row, taxonomy: Taxonomy) -> Row:
     """Return detections as columns, with a heading if offsets need one and `values` has none."""
     columns: Row = {
-        f"{name}s": [item.get(name) for item in items] for name in ("range", "range_error")
+        f"{name}s": [item.get(name) for item in items]
+        for name in ("bearing_error", "range", "range_error")
     }
     classes: list[str | Row] = []
     for value in (item.get("class") for item in items):
@@ -258,56 +288,6 @@ def _columns(items: Sequence[Row], values: Row, taxonomy: Taxonomy) -> Row:
     return columns
 
 
-def unplaced_parts(text: str) -> tuple[str, list[str], list[str]]:
-    """Return a sentence of objects with directions, other objects, and absent objects.
-
-    If no object has a direction, all remain in the sentence.
-
-    >>> unplaced_parts("bench at 40, bus stop, lamp at 80, no hydrant")
-    ('bench at 40, lamp at 80', ['bus stop'], ['hydrant'])
-    >>> unplaced_parts("bench, lamp")
-    ('bench, lamp', [], [])
-    """
-    parts = _parts(text)
-    absent = [match[1] for part in parts if (match := _ABSENT.fullmatch(part))]
-    visible = [part for part in parts if not _ABSENT.fullmatch(part)]
-    placed = [part for part in visible if _PLACED.fullmatch(part)]
-    if not placed:
-        return ", ".join(visible), [], absent
-    return ", ".join(placed), [part for part in visible if part not in placed], absent
-
-
-def unplaced_codes(text: str, taxonomy: Taxonomy) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
-    """Return the sentence with directions, and class codes of undirected and of absent objects.
-
-    As `unplaced_parts`, with class codes in place of words.
-    """
-    sentence, *others = unplaced_parts(text)
-    unplaced, absent = (tuple(class_code(word, taxonomy) for word in words) for words in others)
-    return sentence, unplaced, absent
-
-
-def _parts(text: str) -> list[str]:
-    return [part for part in map(_spaced, re.split(r"[,;\n]", text)) if part]
-
-
-def _sentence_detections(text: str) -> list[Row]:
-    """Return the detections in a sentence."""
-    detections = []
-    for part in _parts(text):
-        match = _PLACED.fullmatch(part)
-        if match is None:
-            detections.append({"class": part})
-            continue
-        detection: Row = {key: match[key] for key in ("bearing", "offset", "range")}
-        if match["ahead"]:
-            detection["offset"] = 0.0
-        elif match["side"] and match["side"].lower() == "left":
-            detection["offset"] = -float(match["offset"])
-        detections.append({"class": match["name"]} | detection)
-    return detections
-
-
 def _scores(chances: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:
     """Return the probability of each class code; the rest, up to one, is for any class."""
     scores = np.zeros(CLASSES)
@@ -326,28 +306,37 @@ def _ranges(
     values: Row, furthest: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
     """Return ranges and errors, None if all are unknown; `furthest` are the visibility ranges."""
-    unknown = [None] * len(furthest)
-    columns = []
-    for name in ("ranges", "range_errors"):
-        column = values.get(name, unknown)
-        # A single number is for all objects.
-        column = _values(column) if isinstance(column, (str, list)) else [column] * len(furthest)
-        if len(column) != len(furthest):
-            what = name.replace("_", " ")
-            raise InputError(
-                f"{len(column)} {what} were given for {len(furthest)} objects; give one for each."
-            )
-        columns.append(column)
-    pairs = [_range(word, far) for word, far in zip(columns[0], furthest.tolist(), strict=True)]
+    words = _column(values, "ranges", len(furthest))
+    pairs = [_range(word, far) for word, far in zip(words, furthest.tolist(), strict=True)]
     ranges, guessed = np.array(pairs).reshape(-1, 2).T
-    own = [
-        math.nan if value in UNKNOWN else _number("a range error", value) for value in columns[1]
-    ]
-    errors = np.where(np.isnan(own), guessed, own)
+    own = _errors(values, "range_errors", len(furthest))
+    errors = guessed if own is None else np.where(np.isnan(own), guessed, own)
     return (
         None if np.isnan(ranges).all() else ranges,
         None if np.isnan(errors).all() else errors,
     )
+
+
+def _errors(values: Row, name: str, size: int) -> NDArray[np.float64] | None:
+    """Return a column of errors, NaN where unknown; None if all are unknown."""
+    what = f"a {name.replace('_', ' ').removesuffix('s')}"
+    errors = np.array(
+        [
+            math.nan if value in UNKNOWN else _number(what, value)
+            for value in _column(values, name, size)
+        ]
+    )
+    return None if np.isnan(errors).all() else errors
+
+
+def _column(values: Row, name: str, size: int) -> list[Any]:
+    """Return the value of each object; a single number is for all of them."""
+    column = values.get(name)
+    column = _values(column) if isinstance(column, (str, list)) else [column] * size
+    if len(column) != size:
+        what = name.replace("_", " ")
+        raise InputError(f"{len(column)} {what} were given for {size} objects; give one for each.")
+    return column
 
 
 def _range(value: object, furthest: float) -> tuple[float, float]:

@@ -34,9 +34,12 @@ FINE_POINT_ERROR = 6.5
 HOUR_ERROR = 8.7
 """An hour on a clock: up to 15 degrees."""
 
-RIGHT, BACK, HOURS = 90.0, 180.0, 12
-MOST_COUNT = 20
+RIGHT, HOURS = 90.0, 12
+MOST_COUNT, MOST_ADJECTIVES = 20, 2
 UNITS = frozenset({"metres", "degrees", "hours"})
+# Attributes of `_Part` by kind of item: directions, and what a phrase says of the part.
+DIRECTIONS = {"compass": "points", "turn": "turns", "hours": "hours", "degrees": "degrees"}
+FLAGS = {"none": "absent", "facing": "facing", "within": "within"}
 SEPARATORS = frozenset({"end", "also"})
 ADJECTIVES_FIRST = frozenset({"en", "de"})
 """Languages in which a word after a thing makes another thing of it, such as "tree stump"."""
@@ -57,13 +60,14 @@ _DIRECTIONS = (
 class Sentence:
     """What a sentence says.
 
-    `row` has the objects as ``detections`` of `parse_view`, ``notes`` on what was not used, and the
-    ``heading`` with its error if the sentence gives it. `unplaced` and `absent` are the class codes
-    of objects that were seen in an unknown direction, if others have one, and of those that are not
-    in sight.
+    `row` has the objects as ``detections`` of `parse_view`, and the ``heading`` with its error if
+    the sentence gives it; `notes` are on words that were not used. `unplaced` and `absent` are the
+    class codes of objects that were seen in an unknown direction, if others have one, and of those
+    that are not in sight.
     """
 
     row: Row
+    notes: tuple[str, ...] = ()
     unplaced: Codes = ()
     absent: Codes = ()
 
@@ -96,8 +100,8 @@ def read_sentence(text: str, taxonomy: Taxonomy) -> Sentence:
     >>> sentence = read_sentence("2 green benches on the left, a lamp, no tree", paper_taxonomy())
     >>> [(item["class"], item["offset"]) for item in sentence.row["detections"]]
     [('L', -90.0), ('L', -90.0)]
-    >>> sentence.unplaced, sentence.absent, sentence.row["notes"]
-    ((3,), (1,), ["'green' was not used."])
+    >>> sentence.unplaced, sentence.absent, sentence.notes
+    ((3,), (1,), ("'green' was not used.",))
     """
     tokens = [*_TOKEN.finditer(text.replace("º", "°"))]
     vocabulary = Vocabulary.of([match["word"] for match in tokens if match["word"]], taxonomy)
@@ -115,7 +119,7 @@ def read_sentence(text: str, taxonomy: Taxonomy) -> Sentence:
                 waiting = None
             things.append(part)
         elif part.others or part.absent:
-            raise _unknown_class(part, vocabulary, taxonomy)
+            raise _unknown_class(part, vocabulary)
         elif last is not None and part.says_where and last.can_take(part):
             last.take(part)
         elif part.says_where:
@@ -145,18 +149,18 @@ def _sentence(things: Sequence[_Part], look: Row, taxonomy: Taxonomy) -> Sentenc
         if thing.range is not None
     ]
     return Sentence(
-        row={"detections": rows, "notes": notes, **look},
+        row={"detections": rows, **look},
+        notes=tuple(notes),
         unplaced=tuple(unplaced),
         absent=tuple(code for thing in things if thing.absent for code in thing.codes),
     )
 
 
-def _unknown_class(part: _Part, vocabulary: Vocabulary, taxonomy: Taxonomy) -> UnknownNameError:
+def _unknown_class(part: _Part, vocabulary: Vocabulary) -> UnknownNameError:
     word = " ".join(part.others) or part.text
-    legend = ", ".join(item.title.lower() for item in taxonomy.classes)
     return UnknownNameError(
-        f"class {word!r} is unknown{vocabulary.nearest(word)}; give a word for one of these: "
-        f"{legend}."
+        f"class {word!r} is unknown{vocabulary.nearest(word)}; `semsig info` lists the classes of "
+        "a city, and `semsig sources` those of a catalogue."
     )
 
 
@@ -177,7 +181,7 @@ def _items(
 ) -> Iterator[_Item]:
     """Yield the longest phrases and things, from left to right."""
     symbols = {item.symbol: item.code for item in taxonomy.classes} | {"?": WILDCARD}
-    place, first = 0, True  # whether a symbol may come next
+    place, first, numbered = 0, True, False  # whether a symbol or a unit may come next
     while place < len(tokens):
         token, text, size = tokens[place], tokens[place].group(), 1
         if token["end"]:
@@ -190,20 +194,29 @@ def _items(
             item = _Item("symbol", symbols[text], text)
         else:
             following = tokens[place : place + LONGEST]
-            words = itertools.takewhile(bool, (other["word"] for other in following))
-            size, item = _phrase([*words], vocabulary)
+            words = [*itertools.takewhile(bool, (other["word"] for other in following))]
+            size, item = _phrase(words, vocabulary, numbered=numbered)
         yield item
+        numbered = item.kind == "number"
         first = item.kind in SEPARATORS or (first and item.kind in {"skip", "number", "none"})
         place += size
 
 
-def _phrase(words: Sequence[str], vocabulary: Vocabulary) -> tuple[int, _Item]:
-    """Return the longest phrase or thing at the beginning of some words, and its length."""
+def _phrase(
+    words: Sequence[str], vocabulary: Vocabulary, *, numbered: bool = False
+) -> tuple[int, _Item]:
+    """Return the longest phrase or thing at the beginning of some words, and its length.
+
+    After a number, a unit goes before a thing, as "Uhr" (clock) does in "3 Uhr".
+    """
     for size in range(len(words), 0, -1):
         text = " ".join(words[:size])
+        meaning = vocabulary.meaning(words[:size])
+        if meaning and numbered and meaning[0] in UNITS:
+            return size, _Item(*meaning, text)
         if (code := vocabulary.class_of(words[:size])) is not None:
             return size, _Item("thing", code, text)
-        if meaning := vocabulary.meaning(words[:size]):
+        if meaning:
             return size, _Item(*meaning, text)
     return 1, _Item("other", None, words[0])
 
@@ -224,12 +237,14 @@ def _part(items: list[_Item], vocabulary: Vocabulary, *, joined: bool) -> _Part:
     """Collect the items of a part."""
     part = _Part(text=" ".join(item.text for item in items), joined=joined)
     named = any(item.kind == "thing" for item in items)
-    before, within = "", ""
+    before = ""
     while items:
         item, *items = items
-        if item.kind == "symbol" and named:  # a letter before a thing: "a bench"
-            _, item = _phrase([item.text], vocabulary)
-        if item.kind == "number":
+        if item.kind == "symbol":  # a letter before a thing is a word: "a bench"
+            _, item = (
+                _phrase([item.text], vocabulary) if named else (1, replace(item, kind="thing"))
+            )
+        elif item.kind == "number":
             unit = items[0].kind if items else ""
             if unit in UNITS:
                 del items[0]
@@ -238,23 +253,10 @@ def _part(items: list[_Item], vocabulary: Vocabulary, *, joined: bool) -> _Part:
             item = replace(item, kind=unit)
         elif item.kind in UNITS:
             item = replace(item, kind="other")
-        match item.kind:
-            case "thing" | "symbol":
-                part.codes.append(item.value)
-                part.words.append((part.run, item))
-            case "other":
-                part.words.append((part.run, item))
-            case "count":
-                part.count = int(item.value)
-            case "within":
-                within = "within "
-            case "metres":
-                part.range = f"{within}{item.value:g} m"
-            case "skip":
-                pass
-            case _:
-                part.add(item)
+        part.add(item)
         before = item.kind
+    if before == "at" and part.codes:
+        raise InputError(f"{part.text!r} ends before it says where; {_DIRECTIONS}.")
     return part
 
 
@@ -273,6 +275,7 @@ class _Part:
     count: int = 1
     absent: bool = False
     facing: bool = False
+    within: bool = False
     heading: float | None = None
     points: list[float] = field(default_factory=list)
     turns: list[float] = field(default_factory=list)
@@ -308,7 +311,7 @@ class _Part:
     def take(self, other: _Part) -> None:
         """Add the direction and the distance of another part."""
         self.text += f", {other.text}"
-        for name in ("points", "turns", "hours", "degrees"):
+        for name in DIRECTIONS.values():
             getattr(self, name).extend(getattr(other, name))
         self.range = self.range or other.range
 
@@ -330,25 +333,27 @@ class _Part:
         )
 
     def add(self, item: _Item) -> None:
-        """Add a direction or another phrase that ends a run of words."""
+        """Add a phrase, a thing, or a number with its unit as its kind."""
+        kind, value = item.kind, item.value
+        if kind in {"thing", "other"}:
+            self.words.append((self.run, item))
+            self.codes += [value] if kind == "thing" else []
+            return
+        if kind == "skip":
+            return
         self.run += 1
-        match item.kind:
-            case "none":
-                self.absent = True
-            case "facing":
-                self.facing = True
-            case "range":
-                self.range = self.range or item.value
-            case "compass" | "degrees" if self.facing and self.heading is None:
-                self.heading = item.value
-            case "compass":
-                self.points.append(item.value)
-            case "turn":
-                self.turns.append(item.value)
-            case "hours":
-                self.hours.append(item.value)
-            case "degrees":
-                self.degrees.append(item.value)
+        if kind in {"compass", "degrees"} and self.facing and self.heading is None:
+            self.heading = value
+        elif kind in DIRECTIONS:
+            getattr(self, DIRECTIONS[kind]).append(value)
+        elif kind in FLAGS:
+            setattr(self, FLAGS[kind], True)
+        elif kind == "count":
+            self.count = int(value)
+        elif kind == "metres":
+            self.range = f"within {value:g} m" if self.within else f"{value:g} m"
+        elif kind == "range":
+            self.range = self.range or value
 
     def check(self, vocabulary: Vocabulary, last: _Part | None) -> None:
         """Raise InputError for words that are not understood, or for several things."""
@@ -360,7 +365,8 @@ class _Part:
                 for (run, item), (next_run, word) in itertools.pairwise(self.words)
                 if run == next_run and item.kind != "other" and word.kind == "other"
             ]
-        if strange:
+        if strange or len(self.others) > MOST_ADJECTIVES:
+            strange = strange or self.others
             raise InputError(
                 f"{' '.join(strange)!r} in {self.text!r} is not understood; {_DIRECTIONS}."
             )
@@ -382,24 +388,26 @@ class _Part:
     def place(self) -> Row:
         """Return the direction as values of a detection; empty without any."""
         points, turns, degrees = self.points, self.turns, self.degrees
+        place: Row | None = None
         match len(turns), len(degrees), len(points), len(self.hours):
             case 0, 0, 0, 0:
-                return {}
+                place = {}
             case 0, 1, 0, 0:
-                return {"bearing": degrees[0]}
+                place = {"bearing": degrees[0]}
             case 1, 1, 0, 0 if abs(turns[0]) == RIGHT:
-                return {"offset": degrees[0] * turns[0] / RIGHT}
+                place = {"offset": degrees[0] * turns[0] / RIGHT}
             case 1, 0, 0, 0:
-                return {"offset": turns[0], "bearing_error": SIDE_ERROR}
-            case 2, 0, 0, 0 if sorted({abs(turn) == RIGHT for turn in turns}) == [False, True]:
+                place = {"offset": float(turns[0]), "bearing_error": SIDE_ERROR}
+            case 2, 0, 0, 0 if sorted(abs(turn) == RIGHT for turn in turns) == [False, True]:
                 along, side = sorted(turns, key=lambda turn: abs(turn) == RIGHT)
                 away = (along + RIGHT) / 2.0
-                return {"offset": math.copysign(away, side), "bearing_error": POINT_ERROR}
+                place = {"offset": math.copysign(away, side), "bearing_error": POINT_ERROR}
             case 0, 0, 1, 0:
-                fine = points[0] % (RIGHT / 2.0) != 0
-                error = FINE_POINT_ERROR if fine else POINT_ERROR
-                return {"bearing": points[0], "bearing_error": error}
+                error = FINE_POINT_ERROR if points[0] % (RIGHT / 2.0) else POINT_ERROR
+                place = {"bearing": points[0], "bearing_error": error}
             case 0, 0, 0, 1 if 1 <= self.hours[0] <= HOURS:
                 offset = self.hours[0] % HOURS * (FULL_TURN / HOURS)
-                return {"offset": offset, "bearing_error": HOUR_ERROR}
-        raise InputError(f"the direction in {self.text!r} is not clear; {_DIRECTIONS}.")
+                place = {"offset": offset, "bearing_error": HOUR_ERROR}
+        if place is None:
+            raise InputError(f"the direction in {self.text!r} is not clear; {_DIRECTIONS}.")
+        return place

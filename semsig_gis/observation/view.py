@@ -59,7 +59,6 @@ class ViewRecord(SignatureRecord, PhotoRecord):
     scores: NotRequired[list[dict[str, float]]]
     photos: NotRequired[list[PhotoRecord]]
     photo: NotRequired[list[int]]
-    notes: NotRequired[list[str]]
 
 
 def check_north(north_sigma: float) -> None:
@@ -409,8 +408,6 @@ class View(Signature):
                 {names[code]: float(row[code]) for code in np.flatnonzero(row).tolist()}
                 for row in self.scores
             ]
-        if self.notes:
-            values["notes"] = [*self.notes]
         if len(self.photos) == 1:
             return {**values, **self.photos[0].to_dict()}
         values["photos"] = [photo.to_dict() for photo in self.photos]

@@ -26,6 +26,8 @@ LISTS = ("skip", "at", "none", "also", "facing", "degrees", "metres", "hours", "
 TABLES = ("numbers", "turn", "compass", "range")
 SHORT_WORD = 3
 """Words up to this number of letters have no endings."""
+LETTERS = 3
+"""Letters of the longest point of the compass, such as NNE."""
 LONGEST = 6
 """Words in the longest phrase."""
 
@@ -41,6 +43,11 @@ def plain_word(word: str) -> str:
     """
     letters = unicodedata.normalize("NFKD", word.casefold())
     return "".join(letter for letter in letters if not unicodedata.combining(letter))
+
+
+def is_point(word: str) -> bool:
+    """Return whether a word may be the letters of a point of the compass, such as NE or S."""
+    return word.isupper() and len(word) <= LETTERS
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -61,24 +68,28 @@ class Vocabulary:
     def of(cls, words: Sequence[str], taxonomy: Taxonomy) -> Vocabulary:
         """Return the vocabulary of the language that knows most of the words, English first."""
         known = class_words(taxonomy)
-        plain = [plain_word(word) for word in words]
-        languages = [*_phrases()]
-        counts = {name: sum(word in _known(known, name) for word in plain) for name in languages}
-        return _vocabulary(known, max(languages, key=counts.__getitem__))
+
+        def count(language: str) -> int:
+            letters, own = _phrases()[language]["letters"], _known(known, language)
+            return sum(
+                word in letters if is_point(word) else plain_word(word) in own for word in words
+            )
+
+        return _vocabulary(known, max(_phrases(), key=count))
 
     def class_of(self, words: Sequence[str]) -> int | None:
         """Return the class code for the words of a thing, None if they are for no class."""
         names = [words_of(word) for word in words]
-        # A thing does not begin or end with an article.
-        if not names or not names[0] or not names[-1]:
+        # A thing does not begin or end with an article or a letter, such as S for south.
+        if not names[0] or not names[-1] or min(len(words[0]), len(words[-1])) == 1:
             return None
         return self.classes.get("".join(itertools.chain(*names)))
 
     def meaning(self, words: Sequence[str]) -> tuple[str, Any] | None:
         """Return the kind and the value of a phrase, None if it has no meaning."""
         (word, *more) = words
-        capitals = word.isupper() or (self.language == "en" and len(word) > 1)
-        if not more and capitals and (bearing := self.letters.get(word.upper())) is not None:
+        letters = is_point(word) or (self.language == "en" and len(word) > 1)
+        if not more and letters and (bearing := self.letters.get(word.upper())) is not None:
             return "compass", bearing
         kind, value = self.phrases.get(tuple(map(plain_word, words)), (None, None))
         if kind is None:

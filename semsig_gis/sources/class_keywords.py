@@ -13,7 +13,7 @@ from semsig_gis.core import WILDCARD, UnknownNameError, nearest_name
 from semsig_gis.sources.catalog import data_folder, load_catalog
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Container, Iterable, Mapping
 
     from semsig_gis.core import Taxonomy
 
@@ -153,7 +153,7 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
     text = word.strip()
     if len(text) == 1:
         return int(taxonomy.encode(text)[0])
-    words = _class_words(class_words(taxonomy))
+    words = _class_words(class_words(taxonomy, said={"en"}))
     code: int | None
     if "=" in text:
         key, _, value = (part.strip() for part in text.partition("="))
@@ -183,19 +183,23 @@ def _content() -> dict[str, Any]:
     return tomllib.loads((data_folder() / "keywords.toml").read_text(encoding="utf-8"))
 
 
-def class_words(taxonomy: Taxonomy) -> tuple[tuple[str, int, str], ...]:
+def class_words(
+    taxonomy: Taxonomy, *, said: Container[str] | None = None
+) -> tuple[tuple[str, int, str], ...]:
     """Return the words for the classes, each with its language and class code.
 
-    The language of names and titles is empty, because they may be in any.
+    The language of names and titles is empty, because they may be in any. Words that only people
+    say may be limited to the languages `said`.
     """
     lists = _content()["classes"]
     words = [("", WILDCARD, "unknown")]
     for item in taxonomy.classes:
         words += [("", item.code, item.name.replace("_", " ")), ("", item.code, item.title)]
-        by_language = dict(lists.get(item.name, {}))
-        for by_key in (by_language.pop(SPOKEN, {}), by_language):
-            for key, phrases in by_key.items():
-                words += [(key, item.code, phrase) for phrase in phrases if key != "fields"]
+        by_key = dict(lists.get(item.name, {}))
+        spoken = by_key.pop(SPOKEN, {}).items()
+        lists_of_words = [pair for pair in by_key.items() if pair[0] != "fields"]
+        lists_of_words += [pair for pair in spoken if said is None or pair[0] in said]
+        words += [(key, item.code, word) for key, phrases in lists_of_words for word in phrases]
     return tuple(words)
 
 

@@ -60,7 +60,7 @@ def test_json_lines_and_csv_give_same_queries(
 def test_sentences_with_unplaced_and_absent_objects() -> None:
     lines = [
         json.dumps({"see": text})
-        for text in ("bench at 40, bus stop, lamp at 80", "no tree", "lamp, bench", "no lampe")
+        for text in ("bench at 40, bus stop, lamp at 80", "no tree", "lamp, bench", "no lamb")
     ]
     mixed, none, plain, slip = parse_queries(lines, "x", taxonomy=TAXONOMY)
     assert parts_of(signature_of(mixed))[1].tolist() == [40.0, 80.0]

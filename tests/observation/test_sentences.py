@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +16,7 @@ from noisy_cells import column
 from sentences import refused
 
 from semsig_gis.core import SemsigError
-from semsig_gis.observation import GUESS_ERROR, Photo, parse_view
+from semsig_gis.observation import GUESS_ERROR, Photo, parse_seen, parse_view
 from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ SAME = """
 {"see": "bench at 40, lamp at 80 12 m"}
 {"see": "lamp @80° about 12 metres\\na bench at 40 degrees"}
 {"see": "amenity=bench 40 right; street light 80 right 12m away", "heading": 0}
-{"see": "bench ahead, D 40 right 12 m", "heading": 40}
+{"see": "bench 0 right, D 40 right 12 m", "heading": 40}
 {"detections": [{"class": "D", "bearing": 80, "range": "12"}, {"class": "Bench", "bearing": 40}]}
 {"detections": [{"class": "D", "offset": 90, "range": 12}, {"class": "L", "offset": 50}],
  "heading": -10}
@@ -134,12 +136,19 @@ NUMBERS = st.floats(0.5, 100.0)
 ANGLES = st.integers(-360, 360)
 RANGES = st.none() | NUMBERS | st.sampled_from(["near", "middle", "far", "within 7.5 m", "?"])
 ERRORS = st.none() | st.floats(0.01, 3.0)
+BEARING_ERRORS = st.none() | st.floats(0.01, 180.0)
 CLASSES = st.sampled_from(["D", "lamp", "Bus stop", "bench", "?", "unknown"]) | st.dictionaries(
     st.sampled_from(["D", "bench", "traffic_light", "?"]), st.floats(0.0, 0.25), max_size=4
 )
 DETECTIONS = st.lists(
     st.fixed_dictionaries(
-        {"class": CLASSES, "bearing": ANGLES, "range": RANGES, "range_error": ERRORS}
+        {
+            "class": CLASSES,
+            "bearing": ANGLES,
+            "bearing_error": BEARING_ERRORS,
+            "range": RANGES,
+            "range_error": ERRORS,
+        }
     ),
     max_size=5,
 )
@@ -166,14 +175,26 @@ def test_view_is_written_and_parsed_again(photos: list[dict[str, Any]]) -> None:
 
 
 REFUSED: list[tuple[dict[str, Any], str]] = [
-    ({"see": "lampe at 40"}, "the nearest is 'lamp'"),
-    ({"see": "lamp at"}, "'lamp at'"),
-    ({"see": "lamp at 40, bench"}, "neither a bearing nor an offset"),
-    ({"see": "lamp at 40 soon"}, "range 'soon' cannot be read"),
+    ({"see": "lamb at 40"}, "class 'lamb' is unknown; the nearest is 'lamp'; `semsig info`"),
+    ({"see": "lamp at"}, "'lamp at' ends before it says where"),
+    ({"see": "lamp at abc"}, "'abc' in 'lamp at abc' is not understood; give degrees"),
+    ({"see": "lamp at 40, bench"}, "things with and without a direction"),
+    ({"see": "lamp at 40, no bench"}, "what is not in sight"),
+    ({"see": "lamp at 40 soon"}, "'soon' in"),
+    ({"see": "lamp 40"}, "the number 40 in 'lamp 40' is not clear"),
+    ({"see": "tree stump left"}, "'stump' in"),
+    ({"see": "lamp left of a tree"}, "names several things"),
+    ({"see": "lamp left NE"}, "the direction in 'lamp left NE' is not clear"),
+    ({"see": "lamp at 13 o'clock"}, "is not clear"),
+    ({"see": "no bench on the left"}, "says where something is not"),
+    ({"see": "no bench and lamp"}, "say 'no' before each thing"),
+    ({"see": "lamp at 2, on the left"}, "'on the left' does not say what is there"),
+    ({"see": "one very old and a very big dark tree"}, "'very old'"),
+    ({"see": "lamp left, tree NE"}, "say where you look"),
+    ({"see": "facing north, lamp left", "heading": 20}, "give it once"),
     ({"see": "lamp at 40 within 0 m"}, "'within 0 m'"),
     ({"see": "lamp at 400"}, "bearing 400"),
-    ({"see": "lamp near"}, "'lamp near'"),
-    ({"see": "lamp 10 left, bench at 20"}, "without the heading"),
+    ({"see": "lamp 10 left, bench at 20"}, "mixes directions from north"),
     ({"see": "lamp 10 left", "heading_error": 5}, "without the heading"),
     ({"see": "lamp", "types": "D"}, "see and types were given"),
     ({"see": "lamp", "fov": 70, "heading": 0}, "needs the bearings"),
@@ -194,6 +215,8 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"types": "D", "bearings": [1], "ranges": [-1]}, "a range is -1"),
     ({"types": "D", "bearings": [1], "ranges": [5], "range_errors": "much"}, "'much'"),
     ({"types": "D", "bearings": [1], "ranges": [5], "range_errors": 9}, "range error is 9"),
+    ({"types": "D", "bearings": [1], "bearing_errors": [181]}, "bearing error is 181"),
+    ({"types": "D", "bearings": [1], "bearing_errors": [0]}, "bearing error is 0"),
     ({"types": "D", "ranges": [5]}, "needs the bearings"),
     ({"types": "D", "bearings": [1], "scores": [{}, {}]}, "2 scores were given for 1 objects"),
     ({"types": "D", "bearings": [1], "fov": 70}, "without the heading"),
@@ -220,3 +243,95 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 def test_invalid_rows_are_refused(row: dict[str, Any], words: str) -> None:
     with refused(SemsigError, words):
         read(row)
+
+
+SENTENCES: dict[str, dict[str, str]] = tomllib.loads(
+    Path(__file__).with_name("sentences.toml").read_text(encoding="utf-8")
+)
+
+
+def expected_parts(meaning: str) -> list[str]:
+    """Return the things of a meaning in ``sentences.toml``, each of several of its own."""
+    parts = []
+    for part in meaning.split("; "):
+        count, _, thing = part.partition(" ")
+        parts += [thing] * int(count) if count.isdigit() else [part]
+    return sorted(parts)
+
+
+def understood_parts(text: str) -> list[str]:
+    """Return the things of a sentence in the form of ``sentences.toml``."""
+    view, unplaced, absent = parse_seen({"see": text}, taxonomy=TAXONOMY, radius=30.0)
+    relative = view.photos[0].north_sigma is not None
+    parts = [f"no {TAXONOMY.by_code(code).name}" for code in absent]
+    parts += [TAXONOMY.by_code(code).name for code in unplaced]
+    for row, code in enumerate([] if view.codes is None else view.codes.tolist()):
+        part = TAXONOMY.by_code(code).name
+        if view.bearings is not None:
+            bearing = view.bearings[row]
+            offset = bearing if bearing <= 180 else bearing - 360
+            part += f" {offset:+g}" if relative else f" at {bearing:g}"
+        if view.ranges is not None and not math.isnan(view.ranges[row]):
+            is_word = view.range_errors is not None and not math.isnan(view.range_errors[row])
+            part += " near" if is_word else f" {view.ranges[row]:g} m"
+        parts.append(part)
+    return sorted(parts)
+
+
+@pytest.mark.parametrize("language", SENTENCES)
+def test_sentences_of_people_are_understood(language: str) -> None:
+    assert len(SENTENCES[language]) == 10
+    for text, meaning in SENTENCES[language].items():
+        assert understood_parts(text) == expected_parts(meaning), text
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("A bench at 40, E at 20", ["bench at 40", "indicator at 20"]),
+        ("On the left, a bench; on the right, a lamp", ["bench -90", "street_light +90"]),
+        ("links 2 Bänke, 20° rechts eine Ampel", ["bench -90", "bench -90", "traffic_light +20"]),
+        ("vorne links ein Baum", ["alignment_tree -45"]),
+        ("tree behind me on the right", ["alignment_tree +135"]),
+        ("Laterne NO, Baum O", ["alignment_tree at 90", "street_light at 45"]),
+        ("lampadaire NO, arbre O", ["alignment_tree at 270", "street_light at 315"]),
+        (
+            "neither benches nor trees, lamp N",
+            ["no alignment_tree", "no bench", "street_light at 0"],
+        ),
+        ("I can't see a bench", ["no bench"]),
+        ("il n'y a pas de banc, un lampadaire à gauche", ["no bench", "street_light -90"]),
+        ("Bank bei 40", ["bench at 40"]),
+        ("lamp near", ["street_light"]),
+    ],
+)
+def test_other_sentences(text: str, parts: list[str]) -> None:
+    assert understood_parts(text) == parts
+
+
+def test_directions_in_words_have_errors() -> None:
+    text = "bench left, lamp at 3 o'clock, tree ahead right, bin 20 left"
+    assert parsed({"see": text})["bearing_errors"] == [13.0, 8.7, 26.0, None]
+    assert parsed({"see": "bench N, lamp ENE"})["bearing_errors"] == [13.0, 6.5]
+    view = read({"see": "facing NE, bench on the left"})
+    assert column(view, "bearings").tolist() == [315.0]
+    assert view.photos[0].north_sigma == 13.0
+
+
+def test_words_that_are_not_used_are_noted() -> None:
+    assert read({"see": "green bench left"}).notes == ("'green' was not used.",)
+    (note,) = read({"see": "bench at 10 m"}).notes
+    assert "the distance in 'bench at 10 m' was not used" in note
+    assert read({"see": "un banc vert à gauche"}).notes == ("'vert' was not used.",)
+
+
+@pytest.mark.parametrize(
+    ("text", "nearest"),
+    [("lamb at 40", "lamp"), ("Ein Brunnn links", "brunnen"), ("un arbbre à gauche", "arbre")],
+)
+def test_suggestions_are_in_the_language_of_the_sentence(text: str, nearest: str) -> None:
+    with refused(SemsigError, f"the nearest is '{nearest}'"):
+        read({"see": text})
+    with pytest.raises(SemsigError) as caught:
+        read({"see": "pub at 40"})
+    assert "poubelle" not in str(caught.value)

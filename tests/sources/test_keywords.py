@@ -48,9 +48,9 @@ def test_names_of_the_taxonomy_have_priority() -> None:
     ("word", "message"),
     [
         ("lampe", "the nearest is 'lamp'"),
-        ("treehouse", "B tree"),
+        ("treehouse", "tree, fountain"),
         ("fire hydrant", "'fire hydrant' is unknown"),
-        ("highway=crossing", "D street light"),
+        ("highway=crossing", "street light"),
         ("", "give a word"),
         ("b", "symbol 'b' is unknown; the nearest is 'B'"),
     ],
