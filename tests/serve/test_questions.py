@@ -430,7 +430,7 @@ def test_suggestions_are_questions_by_gain(page: Page) -> None:
     assert 0 < gains[0] <= 1
     by_name = {item["class"]: item["question"] for item in suggestions}
     assert by_name["street_light"] == "Is there another street light within 30 m?"
-    assert by_name["indicator"] == "Is there an indicator within 30 m?"
+    assert by_name["indicator"] == "Is there a sign within 30 m?"
     assert len(by_name) == len(page.bench.database.present_codes)
 
 
@@ -457,7 +457,7 @@ def test_questions_about_a_photo_are_about_its_sector(page: Page, bench: Workben
     body = {"views": [{"photos": [seen]}]}
     suggestions = page.ask("/api/suggest", body)
     by_name = {item["class"]: item["question"] for item in suggestions}
-    assert by_name["indicator"] == "Is there an indicator in view, within 30 m?"
+    assert by_name["indicator"] == "Is there a sign in view, within 30 m?"
     # Nothing more is in the photo than what is marked, whatever is behind the camera.
     row = bench.database.select(slice(cell, cell + 1))
     away = (np.asarray(row.bearings) + 180.0) % 360.0 - 180.0

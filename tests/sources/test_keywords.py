@@ -48,10 +48,10 @@ def test_names_of_the_taxonomy_have_priority() -> None:
     ("word", "message"),
     [
         ("lampe", "the nearest is 'lamp'"),
-        ("treehouse", "tree, fountain"),
+        ("treehouse", "the nearest is 'Tree'"),
         ("fire hydrant", "'fire hydrant' is unknown"),
-        ("highway=crossing", "street light"),
-        ("", "give a word"),
+        ("highway=crossing", "`semsig info`"),
+        ("", "`semsig sources`"),
         ("b", "symbol 'b' is unknown; the nearest is 'B'"),
     ],
 )
