@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 from semsig_gis.commands.load import LoadOptions, Quality, catalogs
 from semsig_gis.commands.model import Option, Reporter, Result, command
-from semsig_gis.core import EmptyResultError, InputError
+from semsig_gis.core import CatalogError, EmptyResultError, InputError, SourceError
 
 
 @command(
@@ -105,9 +106,9 @@ class Fetch(LoadOptions):
             )
         with reporter.progress(f"fetching from {hosts}", unit=unit) as advance:
             place = find_area(self.area, catalog, cache=store, http=http)
-            layers = fetch_layers(
-                specs,
-                catalog,
+            fetch = partial(
+                fetch_layers,
+                catalog=catalog,
                 area=place,
                 cache=store,
                 http=http,
@@ -115,6 +116,15 @@ class Fetch(LoadOptions):
                 progress=advance,
                 tell=reporter.remark,
             )
+            try:
+                layers = fetch(specs)
+            except (CatalogError, SourceError) as error:
+                ground = [spec for spec in specs if spec.role != "objects"]
+                asked = self.buildings is not None or self.streets is not None
+                if asked or not any(f"layer {spec.name!r}" in str(error) for spec in ground):
+                    raise
+                reporter.remark(f"without buildings and streets: {error}")
+                layers = fetch([spec for spec in specs if spec not in ground])
         if not any(map(len, layers)):
             low, high = place.bounds[:2], place.bounds[2:]
             raise EmptyResultError(

@@ -283,6 +283,14 @@ def test_fetch_from_a_portal_and_offline_from_the_cache(city: Path, run: Run) ->
         fetch_there = fetch.replace("portal.toml", "elsewhere.toml")
         code, out, err = run(fetch_there, "2,48,3,49", "--server", server.url)
         assert (code, json.loads(out)["objects"]) == (0, 1), err
+        houses = '[[layers]]\nname = "houses"\nrole = "buildings"\ngeometry = "polygon"\n'
+        (city / "houses.toml").write_text(f'{portal}{houses}dataset = "gone"\nfiles = ["x"]\n')
+        fetch_houses = fetch.replace("portal.toml", "houses.toml")
+        code, out, err = run(fetch_houses, "2,48,3,49")
+        assert (code, json.loads(out)["objects"]) == (0, 1), err
+        assert "without buildings and streets" in err
+        assert "layer 'houses'" in err
+        sentence(run(fetch_houses, "2,48,3,49", "--buildings", "b.parquet"), "layer 'houses'")
         sentence(run(fetch, "2,48,3,49", "--server", "portal"), "'portal'", "https://")
         sentence(run(fetch, "Paris"), "'Paris'", "polygon file")
         sentence(run(fetch, "2,48,3"), "2,48,3")
