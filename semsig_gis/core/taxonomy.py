@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 from dataclasses import asdict, dataclass, field, replace
+from string import ascii_letters, digits
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 MAX_CODE = 255
+OWN_CODES = 200
+"""First code of the classes that a user names."""
 WILDCARD = 0
 """Code of an object of unknown class."""
 MAX_RANGE_M = 6000.0
@@ -141,9 +144,35 @@ class Taxonomy(Displayed):
             for item in self.classes
         ]
 
-    def extended(self, classes: Iterable[ObjectClass]) -> Taxonomy:
-        """Return a taxonomy with further classes; their codes, symbols and names must be new."""
-        return Taxonomy((*self.classes, *classes))
+    def extended(self, classes: Iterable[ObjectClass | str]) -> Taxonomy:
+        """Return a taxonomy with further classes; their codes, symbols and names must be new.
+
+        A class that is only a name, such as ``"statue"``, gets a code from 200 and a free symbol.
+
+        >>> from semsig_gis import paper_taxonomy
+        >>> statue = paper_taxonomy().extended(["statue"]).by_name("statue")
+        >>> statue.code, statue.symbol, statue.title
+        (200, 's', 'Statue')
+        """
+        taxonomy = self
+        for item in classes:
+            new = item if isinstance(item, ObjectClass) else taxonomy._new_class(item)
+            taxonomy = Taxonomy((*taxonomy.classes, new))
+        return taxonomy
+
+    def _new_class(self, name: str) -> ObjectClass:
+        """Return a class with a free code and symbol, a letter of its name if possible."""
+        codes = {item.code for item in self.classes}
+        symbols = {item.symbol for item in self.classes}
+        code = next((code for code in range(OWN_CODES, MAX_CODE + 1) if code not in codes), None)
+        letters = (sign for sign in name + ascii_letters + digits if sign in ascii_letters + digits)
+        symbol = next((letter for letter in letters if letter not in symbols), None)
+        if code is None or symbol is None:
+            raise CatalogError(
+                f"class {name!r} cannot be added, because the codes from {OWN_CODES} or the "
+                "symbols are all in use; use fewer classes."
+            )
+        return ObjectClass(code, symbol, name, name.replace("_", " ").capitalize())
 
     def with_ranges(self, ranges: Mapping[str, float]) -> Taxonomy:
         """Return a taxonomy with the visibility ranges (metres) of some classes, by name, replaced.
@@ -173,7 +202,8 @@ class Taxonomy(Displayed):
         names = [item.name for item in self.classes]
         raise UnknownNameError(
             f"class {name!r} is unknown{nearest_name(name, names)}; "
-            f"the classes are {', '.join(names)}."
+            f"the classes are {', '.join(names)}; Taxonomy.extended adds one, as does [[classes]] "
+            "in a catalogue."
         )
 
     def by_code(self, code: int) -> ObjectClass:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -38,18 +39,20 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from semsig_gis.core import AnyCrs
+    from semsig_gis.core import AnyCrs, ObjectClass
     from semsig_gis.objects.table import StreetObjects
     from semsig_gis.sources import RawLayer
 
 WHERE = "the table"
-COLUMNS_SHOWN = 12
+COLUMNS_SHOWN, NAMES_SHOWN = 12, 5
+CLASS_NAME_FORM = re.compile("[a-z][a-z0-9_]*")
 
 
 def objects_from_frame(
     frame: gpd.GeoDataFrame,
     *,
     class_column: str | None = None,
+    new_classes: Sequence[str | ObjectClass] = (),
     tags: bool = False,
     catalog: Catalog | str | Path | None = None,
     layers: Sequence[str] = (),
@@ -67,6 +70,8 @@ def objects_from_frame(
     class_column : str, optional
         Column of class names; rows without a value are omitted. The classes are those of
         `catalog`, or of all built-in catalogues.
+    new_classes : sequence of str or ObjectClass, optional
+        Further classes in this column, by name (see `Taxonomy.extended`).
     tags : bool, default False
         Whether the columns are OpenStreetMap tags; not needed for a table with identifiers of
         elements (such as ``element`` and ``id``, ``feature_id``, or ``osm_id``).
@@ -111,7 +116,9 @@ def objects_from_frame(
     if isinstance(catalog, str | Path):
         catalog = load_catalog(catalog)
     if class_column is not None:
-        return _by_column(frame, class_column, catalog, metric_crs=metric_crs)
+        return _by_column(frame, class_column, new_classes, catalog, metric_crs=metric_crs)
+    if new_classes:
+        raise InputError("new_classes were given without class_column; name the column as well.")
     if catalog is None:
         _require_tags(frame, with_elements=not tags)
         catalog = load_catalog("openstreetmap")
@@ -164,10 +171,16 @@ def _require_tags(frame: gpd.GeoDataFrame, *, with_elements: bool = False) -> No
 
 
 def _by_column(
-    frame: gpd.GeoDataFrame, column: str, catalog: Catalog | None, *, metric_crs: AnyCrs | None
+    frame: gpd.GeoDataFrame,
+    column: str,
+    new_classes: Sequence[str | ObjectClass],
+    catalog: Catalog | None,
+    *,
+    metric_crs: AnyCrs | None,
 ) -> StreetObjects:
     """Return the objects of a table with a column of class names."""
     taxonomy = built_in_taxonomy() if catalog is None else catalog.taxonomy
+    taxonomy = taxonomy.extended(new_classes)
     names = [item.name for item in taxonomy.classes]
     spec = LayerSpec(
         name="frame",
@@ -176,16 +189,23 @@ def _by_column(
         id_field=SOURCE_ID if SOURCE_ID in frame else None,
     )
     layer = _by_rules(frame, spec)
-    unknown = next((str(v) for v in frame[column].dropna().unique() if v not in names), None)
-    if unknown is not None:
+    unknown = [str(value) for value in frame[column].dropna().unique() if value not in names]
+    if unknown:
+        usable = [name for name in unknown if CLASS_NAME_FORM.fullmatch(name)]
+        advice = (
+            f"new_classes={usable[:NAMES_SHOWN]} adds what is missing"
+            if usable
+            else "new_classes adds names of lower-case letters, digits and underscores"
+        )
         raise InputError(
-            f"column {column!r} contains {unknown!r}, which is not a "
-            f"class{nearest_name(unknown, names)}; the classes are {', '.join(names)}, and rows "
-            "without one are left out."
+            f"column {column!r} contains {unknown[0]!r}, which is not a "
+            f"class{nearest_name(unknown[0], names)}; the classes are {', '.join(names)}; "
+            f"{advice}, and rows without a class are left out."
         )
     layer = replace(layer, notes=())  # rows without a class are intended, not worth a note
     catalog = catalog or Catalog(name="frame", title="Table", taxonomy=taxonomy, layers=(spec,))
-    objects = assemble([layer], replace(catalog, layers=(spec,)), metric_crs=metric_crs).objects
+    catalog = replace(catalog, taxonomy=taxonomy, layers=(spec,))
+    objects = assemble([layer], catalog, metric_crs=metric_crs).objects
     lines = frame.attrs.get(LICENSES, ())
     return replace(objects, licenses=tuple(map(Licence, lines))) if lines else objects
 

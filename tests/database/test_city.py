@@ -17,11 +17,13 @@ import shapely
 from sentences import assert_sentence, refused
 from worlds import CORNER, assert_index_fits, assert_same, random_town, surroundings
 
-from semsig_gis.core import CrsError, DatabaseError, InputError
+from semsig_gis.core import CrsError, DatabaseError, GridSpec, InputError
 from semsig_gis.database import (
     City,
     ObjectStore,
     PartitionedDatabase,
+    ViewpointSpec,
+    build,
     build_database,
     built_digest,
     digest,
@@ -35,7 +37,7 @@ from semsig_gis.database import (
     store_path,
 )
 from semsig_gis.database import store as store_module
-from semsig_gis.objects import open_objects
+from semsig_gis.objects import ConflationReport, Loaded, LoadReport, open_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -85,6 +87,48 @@ def test_a_city_in_parts_has_all_parts(parts: Path, database: SignatureDatabase)
     assert city.digest == digest(*city.files)
     assert city.store_path == parts / "_inputs"
     assert city.object_counts == open_store(parts).objects.class_counts
+
+
+def test_a_city_is_built_in_one_call(tmp_path: Path) -> None:
+    houses = HOUSES.assign(name=["town hall", "nothing"])
+    loaded = Loaded(
+        objects=TOWN,
+        report=LoadReport(()),
+        conflation=ConflationReport(()),
+        buildings=houses,
+        streets=STREETS,
+    )
+    city = build(loaded)
+    outdoor = ViewpointSpec(mode="outdoor")
+    expected = build_database(TOWN, viewpoints=outdoor, footprints=houses, streets=STREETS)
+    assert_same(city.database, expected)
+    assert city.dataset is city.database
+    assert city.has_store
+    assert city.store.streets is not None
+    x, y = STREETS.to_crs(TOWN.crs).geometry.iloc[0].centroid.coords[0]
+    assert city.place_name(x, y) == "on Rue É, near town hall"
+    assert city.columns("numbers") is None
+    assert not city.has_columns
+    assert "in memory" in repr(city)
+    with refused(DatabaseError, "only in memory", "save_with_store"):
+        _ = city.path
+    # The same in a file, and from the objects only.
+    written = build(loaded, tmp_path / "city.parquet")
+    again = open_city(written.path)
+    assert_same(again.database, expected)
+    assert again.place_name(x, y) == "on Rue É, near town hall"
+    assert_same(build(TOWN, step=20.0).database, build_database(TOWN, grid=GridSpec(20.0)))
+    empty = dataclasses.replace(loaded, buildings=houses.iloc[:0], streets=None)
+    assert_same(build(empty).database, build_database(TOWN))
+
+
+def test_a_city_is_drawn_and_exported_as_its_database(tmp_path: Path) -> None:
+    city = build(TOWN)
+    assert len(city.to_geodataframe()) == len(city.database)
+    city.export(tmp_path / "city.gpkg")
+    assert {*gpd.list_layers(tmp_path / "city.gpkg")["name"]} >= {"cells", "objects"}
+    city.explore().save(tmp_path / "city.html", title="Our town")
+    assert "Our town" in (tmp_path / "city.html").read_text(encoding="utf-8")
 
 
 def test_files_that_are_not_databases_are_refused(tmp_path: Path) -> None:

@@ -14,8 +14,9 @@ import shapely
 from osm_xml import street_town, write_osm
 from sentences import refused
 
-from semsig_gis.core import CrsError, EmptyResultError, InputError
+from semsig_gis.core import CatalogError, CrsError, EmptyResultError, InputError
 from semsig_gis.database import ObjectStore, ViewpointSpec, build_database
+from semsig_gis.localization import localize
 from semsig_gis.objects import assemble, choose_layers, objects_from_frame, read_files
 from semsig_gis.sources import Catalog, LayerSpec, load_catalog, paper_taxonomy
 
@@ -170,6 +171,23 @@ def test_classes_are_read_from_a_column() -> None:
         objects_from_frame(points(kind=["benhc", "bench"]), class_column="kind")
     with refused(InputError, "'fire_hydrant'", "street_light"):
         objects_from_frame(frame, class_column="kind", catalog=PAPER)
+
+
+def test_classes_of_ones_own_are_added_by_name() -> None:
+    frame = points(kind=["bench", "statue", "rune_stone", None])
+    advice = "new_classes=['statue', 'rune_stone']"
+    with refused(InputError, "'statue'", advice):
+        objects_from_frame(frame, class_column="kind")
+    objects = objects_from_frame(frame, class_column="kind", new_classes=["statue", "rune_stone"])
+    assert objects.to_geodataframe()["class_name"].tolist() == ["bench", "statue", "rune_stone"]
+    view = "statue at 10, rune stone at 90"
+    assert len(localize(build_database(objects), view).query) == 2
+    with refused(InputError, "'Statue'", "lower-case"):
+        objects_from_frame(points(kind=["Statue"]), class_column="kind")
+    with refused(CatalogError, "'bench'"):
+        objects_from_frame(frame, class_column="kind", new_classes=["bench"])
+    with refused(InputError, "class_column"):
+        objects_from_frame(points(amenity=["bench"]), tags=True, new_classes=["statue"])
 
 
 SPECS = (

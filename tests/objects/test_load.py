@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 import shapely
-from osm_xml import node, relation, way, write_osm
+from osm_xml import node, relation, street_town, way, write_osm
+from pyproj import CRS
 from raw_layers import BENCHES, catalog_of, raw_layer
 from sentences import refused
 from servers import Answer
 
-from semsig_gis.core import MERGED, InputError, SourceError, UnknownNameError
+from semsig_gis.core import MERGED, CrsError, InputError, SourceError, UnknownNameError
 from semsig_gis.database import build_database, open_database, save_database
 from semsig_gis.objects import (
     assemble,
     choose_layers,
     layers_in_same_extracts,
+    load,
     open_objects,
     quality_report,
     read_files,
@@ -92,6 +94,46 @@ def test_values_of_other_classes_match_no_pattern_of_the_paper() -> None:
     filtered = rules.apply(rows)
     assert filtered.columns["source_id"].to_pylist() == ["Taxi"]
     assert filtered.notes == ("left out, unlisted in class_by 'type': 'Taxi VIP' 1, 'other' 1",)
+
+
+def test_files_are_loaded_in_one_call(tmp_path: Path) -> None:
+    town = write_osm(tmp_path / "town.osm", *street_town())
+    lines: list[str] = []
+    loaded = load(town, remark=lines.append)
+    osm = load_catalog("openstreetmap")
+    layers, _ = read_files(choose_layers(osm, surroundings=True), [town])
+    same = assemble(layers, osm)
+    assert loaded.objects.table.equals(same.objects.table)
+    assert loaded.buildings is not None
+    assert loaded.buildings.equals(same.buildings)
+    assert "town.osm" in lines[0]
+    for catalog in ("openstreetmap", osm, [osm]):
+        assert len(load([town], catalog=catalog, surroundings=False).objects) == len(same.objects)
+    assert load(town, surroundings=False).buildings is None
+    assert set(load(town, layers=["benches"]).objects.codes) == {osm.taxonomy.by_name("bench").code}
+    with refused(UnknownNameError, "opnstreetmap"):
+        load(town, catalog="opnstreetmap")
+
+
+def test_coordinate_systems_are_given_as_codes_text_or_values(tmp_path: Path) -> None:
+    rows = "lon;lat\n7.42;43.73\n7.43;43.74\n"
+    (tmp_path / "benches.csv").write_text(rows, encoding="utf-8")
+    spec = LayerSpec(name="b", class_name="bench", files=("b*.csv",), x_field="lon", y_field="lat")
+    catalog = catalog_of(layers=(spec,))
+    results = [
+        load(tmp_path, catalog=catalog, crs=crs, metric_crs=metric).objects
+        for crs, metric in (
+            (4326, 32632),
+            ("EPSG:4326", "EPSG:32632"),
+            (CRS.from_epsg(4326), CRS.from_epsg(32632)),
+        )
+    ]
+    for objects in results:
+        assert objects.crs.to_epsg() == 32632
+        assert (objects.xy == results[0].xy).all()
+    for options in ({"metric_crs": 4326}, {"metric_crs": 999_999}, {"crs": 999_999}):
+        with refused(CrsError, "EPSG:"):
+            load(tmp_path, catalog=catalog, **{"crs": 4326, **options})
 
 
 def test_other_layers_of_an_extract_are_counted(tmp_path: Path) -> None:
