@@ -9,7 +9,7 @@ from typing import Annotated, Literal, NotRequired
 from typing_extensions import TypedDict
 
 from semsig_gis.commands.model import Option, Reporter, Result, command
-from semsig_gis.commands.options import Database, Smooth, known_identifiability
+from semsig_gis.commands.options import Database, Smooth, ground_of, known_identifiability
 from semsig_gis.core import InputError
 from semsig_gis.output import export_suffixes, layer_names, raster_names
 
@@ -119,6 +119,9 @@ class Export:
             )
         city = open_city(self.database)
         queries = None if self.evaluation is None else open_evaluation(self.evaluation)
+        ground = ground_of(city) if self.out.suffix.lower() == ".gpkg" else {}
+        if self.layer:
+            ground = {name: table for name, table in ground.items() if name in self.layer}
         # Hexagons count the objects that the database was built from, if they are stored with it.
         stored = city.objects if self.h3 is not None and self.objects is None else None
         with reporter.progress(f"writing {self.out.name}") as advance:
@@ -128,6 +131,7 @@ class Export:
                 layers=self.layer or (),
                 objects=stored if self.objects is None else open_objects(self.objects),
                 evaluation=queries,
+                **ground,
                 identifiability=known_identifiability(city, reporter),
                 geometry=self.geometry,
                 smooth=self.smooth,

@@ -22,6 +22,7 @@ from semsig_gis.commands.options import (
     adapted_noise,
     chosen_method,
     draw_ground,
+    ground_of,
     online_notes,
     query_north,
 )
@@ -393,7 +394,8 @@ class Localize(SearchOptions, QueryOptions):
             # Cells that tie with the last candidate are searched as well.
             answer = locator.locate(answer.query, top=self.top + answer.tied_beyond)
         share = REGION_SHARE if self.share is None else self.share
-        return export_answer(answer, city.database, out, share=share, within=self.within).to_dict()
+        extent = {"share": share, "within": self.within}
+        return export_answer(answer, city.database, out, **extent, **ground_of(city)).to_dict()
 
     def _summary(self, answer: Any, regions: RegionsRecord | None) -> Iterator[str | Table]:  # noqa: ANN401 - an answer of any method
         from semsig_gis.output import answer_summary

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from semsig_gis.localization import METRICS
 
 if TYPE_CHECKING:
     import folium
+    import geopandas as gpd
     from numpy.typing import NDArray
 
     from semsig_gis.core import Signature, Taxonomy
@@ -713,6 +713,14 @@ def known_identifiability(city: City, reporter: Reporter) -> Identifiability | N
         return None
 
 
+def ground_of(city: City) -> dict[str, gpd.GeoDataFrame]:
+    """Return the buildings and the streets in the object store of a city, where it has them."""
+    try:
+        return city.store.ground
+    except DatabaseError:  # a map does not need them
+        return {}
+
+
 def draw_ground(
     map_: folium.Map, city: City, *, buildings: Path | None = None, streets: Path | None = None
 ) -> None:
@@ -724,9 +732,9 @@ def draw_ground(
     houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)
     lines = None if streets is None else read_surroundings(streets, role="streets", crs=crs)
     if houses is None or lines is None:
-        with contextlib.suppress(DatabaseError):  # a map does not need them
-            houses = city.store.footprints if houses is None else houses
-            lines = city.store.streets if lines is None else lines
+        stored = ground_of(city)
+        houses = stored.get("buildings") if houses is None else houses
+        lines = stored.get("streets") if lines is None else lines
     if houses is None and lines is None:
         return
     xy = city.database.xy

@@ -139,6 +139,12 @@ class ObjectStore(Displayed):
         """R-tree over the objects, in their order, built at the first access."""
         return ObjectIndex(self.objects.xy)
 
+    @property
+    def ground(self) -> dict[str, gpd.GeoDataFrame]:
+        """The ``buildings`` and the ``streets``, where there are some."""
+        tables = {"buildings": self.footprints, "streets": self.streets}
+        return {name: table for name, table in tables.items() if table is not None}
+
     @cached_property
     def _names(self) -> PlaceNames:
         return PlaceNames(self.streets, self.footprints)

@@ -23,6 +23,8 @@ from semsig_gis.output.rasters import RASTERS
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    import geopandas as gpd
+
     from semsig_gis.core import Registry
     from semsig_gis.database import CellGeometry, SignatureDatabase
     from semsig_gis.evaluation import Evaluation, Identifiability
@@ -46,6 +48,8 @@ def export_database(
     *,
     layers: str | Sequence[str] = (),
     objects: StreetObjects | None = None,
+    buildings: gpd.GeoDataFrame | None = None,
+    streets: gpd.GeoDataFrame | None = None,
     identifiability: Identifiability | None = None,
     evaluation: Evaluation | None = None,
     geometry: CellGeometry | None = None,
@@ -68,6 +72,8 @@ def export_database(
         formats (default: the hexagons if `h3` is given, else the cells).
     objects : StreetObjects, optional
         The objects that the cells see.
+    buildings, streets : GeoDataFrame, optional
+        The ground below the cells, with a ``name`` where it is known (see `ObjectStore`).
     identifiability : Identifiability, optional
         Chances of the cells to be found, for additional columns or the raster.
     evaluation : Evaluation, optional
@@ -105,6 +111,9 @@ def export_database(
     Layer ``objects``, in the CRS of the objects: ``class_code``, ``symbol``, ``class_name``,
     ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``.
 
+    Layers ``buildings`` and ``streets``, in the CRS of the database: what is within 250 m of the
+    box of the cells, with its ``name`` where it is known.
+
     Layers ``evaluation`` (queries at their true places) and ``evaluation_lines`` (from the true to
     a different best place): the columns of `Evaluation.queries` and ``outcome``: ``successful``
     (the best place is within 50 m with a probability of 0.5 or more) or ``failed``. A GeoPackage
@@ -141,6 +150,8 @@ def export_database(
     suffix = _suffix(path, [f".{name}" for name in FORMATS if name not in ONLY_ANSWERS])
     options = {
         "objects": objects,
+        "buildings": buildings,
+        "streets": streets,
         "identifiability": identifiability,
         "evaluation": evaluation,
         "geometry": geometry,
@@ -166,6 +177,7 @@ def export_database(
     elif write.holds == "layer":
         write(content[0], path, progress=progress)
     else:
+        content.sort(key=lambda layer: layer.display.level < 0)  # the ground is written last
         parts = [part for layer in content for part in layer.parts or (layer,)]
         write(parts, path, progress=progress)
 
@@ -296,6 +308,8 @@ def export_answer(
     *,
     share: float = REGION_SHARE,
     within: float = 0.0,
+    buildings: gpd.GeoDataFrame | None = None,
+    streets: gpd.GeoDataFrame | None = None,
 ) -> SearchRegions:
     """Write the answer to a query in the format of the file's suffix.
 
@@ -312,6 +326,8 @@ def export_answer(
         likelihood method only.
     share, within : float, optional
         Extent of the regions (see `localization.search_regions`).
+    buildings, streets : GeoDataFrame, optional
+        The ground around the likely candidates, for a GeoPackage (see `ObjectStore`).
 
     Returns
     -------
@@ -347,7 +363,8 @@ def export_answer(
         chances = cell_raster(database, "posterior", answer.chances, scale=CHANCES, facts=facts)
         write(chances, path)
         return regions
-    layers = answer_layers(answer, database, regions)
+    ground = {"buildings": buildings, "streets": streets} if write.holds == "layers" else {}
+    layers = answer_layers(answer, database, regions, **ground)
     if write.write_answer is not None:
         write.write_answer(layers, path)
     else:

@@ -387,7 +387,8 @@ class Workbench:
         _, location = self._located(body)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, f"answer.{suffix}")
-            export_answer(location, self.database, file)
+            ground = {} if self.store is None else self.store.ground
+            export_answer(location, self.database, file, **ground)
             return file.read_bytes()
 
     def _noise(self, question: Question) -> str:

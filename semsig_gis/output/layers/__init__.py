@@ -1,10 +1,11 @@
 """Layers of a city: each module makes one, with its columns and its styles, by its own name.
 
 To add a layer, add its module, with a function that `LAYERS.register` decorates. Its parameters are
-results of a city by name: ``database``, ``objects``, ``identifiability``, ``evaluation``,
-``geometry``, ``smoothing`` (metres) and ``resolution`` (of hexagons). A layer needs those without
-a default, and uses the others. `export_database`, its messages, the commands and the general tests
-find it. Another package adds one by an entry point of the group ``semsig_gis.layers``.
+results of a city by name: ``database``, ``objects``, ``buildings``, ``streets``,
+``identifiability``, ``evaluation``, ``geometry``, ``smoothing`` (metres) and ``resolution`` (of
+hexagons). A layer needs those without a default, and uses the others. `export_database`, its
+messages, the commands and the general tests find it. Another package adds one by an entry point of
+the group ``semsig_gis.layers``.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ LAYERS: Registry[Callable[..., Layer]] = Registry(
     __name__,
     __path__,
     partial(installed_outputs, ENTRY_POINTS),
-    without=("answer", "columns", "model", "styles"),
+    without=("answer", "columns", "ground", "model", "styles"),
 )
 
 

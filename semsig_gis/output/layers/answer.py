@@ -13,8 +13,10 @@ import shapely
 from semsig_gis.core import VERDICTS, place_links
 from semsig_gis.database import CellTable
 from semsig_gis.localization import UNKNOWN_NAME, Location
+from semsig_gis.output.layers.buildings import buildings_layer
 from semsig_gis.output.layers.columns import form_of
 from semsig_gis.output.layers.model import Display, table_layer
+from semsig_gis.output.layers.streets import streets_layer
 from semsig_gis.output.layers.styles import Style, StyleClass, Symbol, by_answer, by_rank
 
 if TYPE_CHECKING:
@@ -149,11 +151,17 @@ LEAST_CHANCE = 0.01
 
 
 def answer_layers(
-    answer: Answer, database: SignatureDatabase, regions: SearchRegions
+    answer: Answer,
+    database: SignatureDatabase,
+    regions: SearchRegions,
+    *,
+    buildings: gpd.GeoDataFrame | None = None,
+    streets: gpd.GeoDataFrame | None = None,
 ) -> list[Layer]:
     """Return layers of the regions to search and the candidates.
 
-    By likelihood, there are also the place, its ellipse and, of explained candidates, the rays.
+    By likelihood, there are also the place, its ellipse and, of explained candidates, the rays. The
+    last are streets and buildings around what is drawn, where given.
     """
     candidates = answer.to_geodataframe()
     cells = CellTable(database.select(candidates["cell"].to_numpy()))
@@ -214,8 +222,14 @@ def answer_layers(
             styles=(by_rank(str(rank), geometry="point"),),
         ),
     ]
+    shapes = candidates.geometry.to_numpy()[:drawn]
+    if isinstance(answer, Location):
+        shapes = np.append(shapes, shapely.Point(answer.xy))
+    below = ((streets_layer, streets), (buildings_layer, buildings))
+    ground = [make(database, table, shapes) for make, table in below if table is not None]
+    ground = [layer for layer in ground if layer.rows]
     if not isinstance(answer, Location):
-        return layers
+        return layers + ground
     table = pd.DataFrame([place_row(answer)]).assign(**link_columns([answer.links]))
     ellipse = [shapely.Polygon(answer.estimate.outline())]
 
@@ -278,7 +292,7 @@ def answer_layers(
                 styles=(RAY_STYLE,),
             )
         )
-    return layers
+    return layers + ground
 
 
 def link_columns(links: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:

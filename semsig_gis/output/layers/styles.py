@@ -138,8 +138,9 @@ class Symbol:
     """How a feature is drawn.
 
     A point is a ``shape`` of ``metres`` on the ground, and of at least ``least_mm`` on the screen;
-    a line ends in the shape, if there is one. ``edge`` is the colour of the outline, and ``sign``
-    the class with the pictogram or the letter that is drawn on the shape.
+    a line is so wide, or thin without metres, or ends in the shape, if there is one. ``edge`` is
+    the colour of the outline, and ``sign`` the class with the pictogram or the letter that is drawn
+    on the shape.
     """
 
     colour: str
@@ -165,11 +166,11 @@ class StyleClass:
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """A style of a layer: its classes by the values of a column."""
+    """A style of a layer: its classes by the values of a column, or one class for all."""
 
     name: str
-    column: str
     classes: tuple[StyleClass, ...]
+    column: str = ""
     last_first: bool = False  # whether the first classes are drawn last, on top
     tiled: bool = False  # whether areas lie side by side, so that none shines through another
 

@@ -47,6 +47,11 @@ def renderer(style: Style, geometry: str, shown: str = "") -> str:
 
     `shown` is an expression: features for which it is false are not drawn.
     """
+    if not style.column:
+        root = ET.Element("renderer-v2", type="singleSymbol")
+        layers = _layers(style.classes[0].symbol, geometry)
+        _add_symbol(ET.SubElement(root, "symbols"), "0", SYMBOLS[geometry], *layers)
+        return ET.tostring(root, encoding="unicode")
     ranges = not any(item.value for item in style.classes)
     kind, parent, child = (
         ("graduatedSymbol", "ranges", "range")
@@ -84,7 +89,11 @@ def _layers(symbol: Symbol, geometry: str) -> tuple[SymbolLayer, ...]:
     if geometry == "line":
         line = {"line_color": _rgba(colour, opacity), "line_width": 0.26, "line_style": "solid"}
         if not symbol.shape:
-            return (("SimpleLine", line),)
+            width = {}
+            if symbol.metres:
+                limits = {"smallest": symbol.least_mm, "largest": LARGEST_MM}
+                width = _metres(symbol.metres, length="line_width", **limits)
+            return (("SimpleLine", {**line, **width, "capstyle": "round", "joinstyle": "round"}),)
         end = {"placement": "lastvertex", "rotate": 0}
         return ("SimpleLine", line), ("MarkerLine", end, _marker(symbol))
     if symbol.sign is not None:
