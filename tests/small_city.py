@@ -6,8 +6,11 @@ import dataclasses
 import functools
 from typing import TYPE_CHECKING
 
+import geopandas as gpd
 import numpy as np
+import shapely
 
+from semsig_gis.core import LICENSES
 from semsig_gis.database import build_database
 from semsig_gis.evaluation import BANDS, ClassGain, Identifiability, evaluate
 from semsig_gis.localization import Method, build_index, localize, locate, named_noise
@@ -27,6 +30,24 @@ def small_city() -> tuple[SignatureDatabase, StreetObjects]:
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     licensed = dataclasses.replace(objects, licenses=(Licence("Town (CC0)", ("trees", "lamps")),))
     return build_database(licensed), licensed
+
+
+@functools.cache
+def small_ground() -> dict[str, gpd.GeoDataFrame]:
+    """Return buildings and streets of the city with names, one of them far away."""
+    west, south, east, north = small_city()[1].table.total_bounds
+    steps = np.linspace(0.0, 1.0, 12)
+    x, y = west + (east - west) * steps, south + (north - south) * steps
+    houses = [*shapely.box(x, y, x + 8.0, y + 8.0), shapely.box(east + 900, y[0], east + 910, y[1])]
+    lines = [shapely.LineString([(place, south), (place, north)]) for place in x]
+    names = [f"No. {number}" for number in range(len(houses))]
+    ground = {
+        "buildings": gpd.GeoDataFrame({"name": names}, geometry=houses, crs="EPSG:32631"),
+        "streets": gpd.GeoDataFrame({"name": names[:-1]}, geometry=lines, crs="EPSG:32631"),
+    }
+    for table in ground.values():
+        table.attrs[LICENSES] = ["Map (ODbL 1.0)"]
+    return ground
 
 
 @functools.cache

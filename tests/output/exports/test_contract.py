@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
+import zipfile
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -14,7 +16,7 @@ import pyogrio
 import pytest
 from pyproj import CRS
 from sentences import refused
-from small_city import chances_of, small_city, small_evaluation
+from small_city import chances_of, small_city, small_evaluation, small_ground
 
 from semsig_gis.core import InputError
 from semsig_gis.output import (
@@ -22,10 +24,13 @@ from semsig_gis.output import (
     LAYERS,
     Writer,
     as_written,
+    cells_layer,
     export_database,
     export_suffixes,
     layer_names,
+    project_archive,
     raster_names,
+    shown_layers,
 )
 
 if TYPE_CHECKING:
@@ -39,10 +44,13 @@ RESULTS: dict[str, Any] = {
     "objects": OBJECTS,
     "evaluation": small_evaluation(),
     "identifiability": chances_of(CITY),
+    **small_ground(),
 }
 OPTIONS: dict[str, tuple[str, ...]] = {
     "cells": ("identifiability",),
     "objects": ("objects",),
+    "buildings": ("buildings",),
+    "streets": ("streets",),
     "evaluation": ("evaluation",),
     "evaluation_lines": ("evaluation",),
     "hexagons": ("objects", "evaluation", "identifiability"),
@@ -50,6 +58,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
 KEYS: dict[str, tuple[str, ...]] = {
     "cells": ("cell_id",),
     "objects": ("source", "source_id"),
+    "buildings": ("name",),
+    "streets": ("name",),
     "evaluation": ("seed", "number"),
     "evaluation_lines": ("seed", "number"),
     "hexagons": ("h3",),
@@ -190,7 +200,8 @@ def test_layer_without_rows_has_its_columns(suffix: str, tmp_path: Path) -> None
 
 def test_help_names_the_formats_layers_and_rasters() -> None:
     assert export_suffixes() == [f".{name}" for name in FORMATS if FORMATS[name].holds != "answer"]
-    assert layer_names() == ["cells", "evaluation", "evaluation_lines", "hexagons", "objects"]
+    evaluated, ground = ["evaluation", "evaluation_lines"], ["buildings", "streets"]
+    assert layer_names() == sorted(["cells", "hexagons", "objects", *evaluated, *ground])
     assert raster_names() == ["ambiguity", "error", "field", "identifiability"]
 
 
@@ -232,3 +243,8 @@ def test_crs_that_is_only_similar_to_a_code_is_kept(suffix: str, tmp_path: Path)
     city = dataclasses.replace(CITY, crs=similar)
     export_database(city, tmp_path / f"a.{suffix}", layers="cells")
     assert gpd.read_file(tmp_path / f"a.{suffix}", layer="cells").crs.equals(similar)
+    layers = [cells_layer(city)]
+    with zipfile.ZipFile(
+        io.BytesIO(project_archive(layers, shown_layers(layers, "a"), "a"))
+    ) as file:
+        assert b"EPSG:25831" not in file.read("project.qgs")

@@ -20,7 +20,14 @@ import pyogrio
 import pytest
 from machine import PATIENCE_S, qgis_variables
 from map_pages import HOSTILE
-from small_city import chances_of, small_city, small_evaluation, small_localization, small_location
+from small_city import (
+    chances_of,
+    small_city,
+    small_evaluation,
+    small_ground,
+    small_localization,
+    small_location,
+)
 
 from semsig_gis.core import PICTOGRAMS, Taxonomy, place_links
 from semsig_gis.localization import search_regions
@@ -66,8 +73,8 @@ def projects(qgis_python: str, tmp_path_factory: pytest.TempPathFactory) -> dict
     folder = tmp_path_factory.mktemp("projects")
     files = [folder / f"{name}.gpkg" for name in ("Old Town & é", "likely", "near", "hostile")]
     layers: dict[str, Any] = {"identifiability": CHANCES, "evaluation": EVALUATION, "h3": 9}
-    export_database(CITY, files[0], objects=OBJECTS, **layers)
-    export_answer(LOCATION, CITY, files[1])
+    export_database(CITY, files[0], objects=OBJECTS, **layers, **small_ground())
+    export_answer(LOCATION, CITY, files[1], **small_ground())
     export_answer(LOCALIZATION, CITY, files[2])
     export_hostile_city(files[3])
     result = subprocess.run(
@@ -112,7 +119,10 @@ def test_city_opens_as_a_project(projects: dict[str, Any]) -> None:
     assert project["groups"] == {
         "Evaluation": ["Queries", lines, figures],
         "City": ["Hexagons", "Street objects", "Signature cells"],
+        "Ground": ["Streets", "Buildings"],
     }
+    assert layers["Streets"]["features"] == len(small_ground()["streets"])
+    assert layers["Buildings"]["features"] == len(small_ground()["buildings"]) - 1  # one is far
     assert project["off"] == [lines]
     assert project["relations"] == [[figures, True]]
     assert {"Old Town & é", f"1:{project['scale']:,}"} < {*project["texts"]}
@@ -140,7 +150,8 @@ def test_answer_opens_as_a_project(
 ) -> None:
     layers = projects[name]["layers"]
     candidates = layers["Candidates"]
-    assert list(projects[name]["groups"]) == ["Answer"]
+    groups = ["Answer", "Ground"] if name == "likely" else ["Answer"]
+    assert list(projects[name]["groups"]) == groups
     assert (candidates["name"], candidates["label"]) == ("candidate 1", 1)
     assert wheel_signs(candidates["tip"]) == signs(answer.candidates["types"].iloc[0])
     lat, lon = (answer.candidate_rows()[0][name] for name in ("lat", "lon"))
