@@ -118,7 +118,8 @@ def command_line(name: str, command: dict[str, Any], values: dict[str, Any]) -> 
 def check_output(path: str, suffixes: list[str]) -> None:
     """Raise CommandError before the work if an output cannot be written.
 
-    An empty suffix accepts any, also a folder. Missing folders are created by the command.
+    An empty suffix accepts any, also a folder. The command creates a folder of results, but not the
+    folder of a file.
     """
     target = Path(path)
     if "" not in suffixes:
@@ -137,6 +138,12 @@ def check_output(path: str, suffixes: list[str]) -> None:
     folder = next(existing, places[-1])
     if not folder.is_dir():
         message = f"{path} cannot be written, since {folder} is not a folder; choose another place."
+        raise CommandError(message)
+    if suffixes != [""] and folder != target.absolute().parent:
+        message = (
+            f"{path} cannot be written, because there is no folder {target.parent}; make it, or "
+            "choose another place."
+        )
         raise CommandError(message)
     if not os.access(folder, os.W_OK | os.X_OK):
         message = (

@@ -36,6 +36,8 @@ __all__ = [
 
 BLENDED = ("regions",)
 """Layers of areas through which the layers below stay visible."""
+GROUND = ("streets", "buildings")
+"""Layers below all others, from above."""
 MUTED = ("cells", "hexagons")
 """Layers that turn grey when there is an answer."""
 GREY = QColor(190, 190, 186, 140)
@@ -76,12 +78,15 @@ def _place_in_group(group: QgsLayerTreeGroup, layer: Any) -> int:  # noqa: ANN40
 
 
 def _height(layer: Any) -> float:  # noqa: ANN401 - any kind of layer
-    """Return the place of a layer from above: points 0, lines 1, areas 2, others below.
+    """Return the place of a layer from above: points 0, lines 1, areas 2, others and the ground.
 
     Blended layers are below other layers of the same geometry, so that nothing is hidden.
     """
     if not isinstance(layer, QgsVectorLayer):
         return LOWEST + 1
+    for number, name in enumerate(GROUND):
+        if _is_one_of(layer, (name,)):
+            return LOWEST + 2 + number
     kind = layer.geometryType()
     height = min(int(getattr(kind, "value", kind)), LOWEST)
     plain = QPainter.CompositionMode.CompositionMode_SourceOver

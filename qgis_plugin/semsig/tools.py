@@ -59,11 +59,8 @@ _TOOLS = (
         "build",
         "build",
         extras={
-            "CELLS": Extra(
-                "Cells",
-                "export",
-                {"database": "=OUT", "objects": "=OBJECTS", "layer": ["cells", "objects"]},
-            )
+            # With the streets and buildings of the database.
+            "CELLS": Extra("Cells", "export", {"database": "=OUT", "objects": "=OBJECTS"})
         },
     ),
     # Many queries are answered with a line of JSON each, which is for other programs.

@@ -160,6 +160,7 @@ def show_twice() -> dict[str, Any]:
     """Write the same file twice while its layers are shown; return both contents."""
     contents = {}
     answer = str(PLACE / "new" / "answer.gpkg")
+    (PLACE / "new").mkdir()
     # The layer has the name of its file, which contains other layers as well.
     area = f"{answer}|layername=regions"
     for time_, query in (

@@ -260,15 +260,16 @@ def test_outputs_are_checked_before_the_work(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "text").write_text("a file")
     (tmp_path / "folder.gpkg").mkdir()
-    for path, suffix in (("a.gpkg", ".gpkg"), (f"{tmp_path}/new/folder/A.GPKG", ".gpkg"),
+    for path, suffix in (("a.gpkg", ".gpkg"), (f"{tmp_path}/A.GPKG", ".gpkg"),
                          ("new/folder", ""), (str(tmp_path), "")):  # fmt: skip
         check_output(path, [suffix])
-    check_output("new/tiles", [".parquet", ""])
+    check_output("tiles", [".parquet", ""])
     for path, suffix, words in (
         ("b.shp", ".gpkg", "does not end in .gpkg"),
         ("gpkg", ".gpkg", "does not end in .gpkg"),
         ("folder.gpkg", ".gpkg", "is a folder"),
         ("text/b.gpkg", ".gpkg", "text is not a folder"),
+        ("new/b.gpkg", ".gpkg", "there is no folder new; make it"),
         ("text/deep/results", "", "text is not a folder"),
         ("text", "", "text is not a folder"),
     ):
