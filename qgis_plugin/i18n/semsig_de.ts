@@ -288,10 +288,6 @@
         <translation>Klasse falscher Objekte</translation>
     </message>
     <message>
-        <source>Classes as letters</source>
-        <translation>Klassen als Buchstaben</translation>
-    </message>
-    <message>
         <source>Clear</source>
         <translation>Leeren</translation>
     </message>
@@ -1090,10 +1086,6 @@
     <message>
         <source>Predict the accuracy</source>
         <translation>Genauigkeit vorhersagen</translation>
-    </message>
-    <message>
-        <source>Print classes in tables as letters, such as DDBL, instead of words.</source>
-        <translation>Klassen in Tabellen als Buchstaben ausgeben, etwa DDBL, statt als Wörter.</translation>
     </message>
     <message>
         <source>Print the properties of a database next to those in the paper.</source>

@@ -288,10 +288,6 @@
         <translation>Classe des faux objets</translation>
     </message>
     <message>
-        <source>Classes as letters</source>
-        <translation>Classes en lettres</translation>
-    </message>
-    <message>
         <source>Clear</source>
         <translation>Effacer</translation>
     </message>
@@ -1090,10 +1086,6 @@
     <message>
         <source>Predict the accuracy</source>
         <translation>Prédire l’exactitude</translation>
-    </message>
-    <message>
-        <source>Print classes in tables as letters, such as DDBL, instead of words.</source>
-        <translation>Afficher les classes des tableaux en lettres, comme DDBL, au lieu de mots.</translation>
     </message>
     <message>
         <source>Print the properties of a database next to those in the paper.</source>
