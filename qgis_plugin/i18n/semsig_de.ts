@@ -4,10 +4,6 @@
 <context>
     <name>Semsig</name>
     <message>
-        <source>--explain, --share and the options from --noise to --objects work only with the likelihood method.</source>
-        <translation>--explain, --share und die Angaben von --noise bis --objects gelten nur für die Methode likelihood.</translation>
-    </message>
-    <message>
         <source>0.9</source>
         <translation>0,9</translation>
     </message>
@@ -26,10 +22,6 @@
     <message>
         <source>A unique cell can be identified at once, one of a thousand cannot. The raster holds, for each cell, the number of cells that look the same. `semsig identify` gives more detail, and takes longer.</source>
         <translation>Eine einmalige Zelle erkennt man sofort, eine von tausend nicht. Das Raster enthält für jede Zelle die Anzahl der Zellen, die gleich aussehen. `semsig identify` sagt mehr und dauert länger.</translation>
-    </message>
-    <message>
-        <source>Accuracy</source>
-        <translation>Genauigkeit der Antworten</translation>
     </message>
     <message>
         <source>Adapt the errors to the queries</source>
@@ -116,6 +108,10 @@
         <translation>Gebiet, das bleibt</translation>
     </message>
     <message>
+        <source>Ask</source>
+        <translation>Fragen</translation>
+    </message>
+    <message>
         <source>Assume that views are from the area of the database. Otherwise the chance that they are from elsewhere is 50 % before their objects are compared.</source>
         <translation>Annehmen, dass Ansichten aus dem Gebiet der Datenbank stammen. Sonst ist die Wahrscheinlichkeit, dass sie von woanders stammen, 50 %, bevor ihre Objekte verglichen werden.</translation>
     </message>
@@ -160,12 +156,24 @@
         <translation>Gebäudegrundrisse, die verdecken, was hinter ihnen liegt.</translation>
     </message>
     <message>
-        <source>Building footprints to write as well (.parquet).</source>
-        <translation>Gebäudegrundrisse, die auch geschrieben werden (.parquet).</translation>
+        <source>Building footprints to write (.parquet).</source>
+        <translation>Gebäudegrundrisse, die geschrieben werden (.parquet).</translation>
     </message>
     <message>
         <source>Buildings</source>
         <translation>Gebäude</translation>
+    </message>
+    <message>
+        <source>Buildings and streets</source>
+        <translation>Gebäude und Straßen</translation>
+    </message>
+    <message>
+        <source>Buildings and streets of the street objects</source>
+        <translation>Gebäude und Straßen der Straßenobjekte</translation>
+    </message>
+    <message>
+        <source>By likelihood, every place gets a chance. A method by distance takes only what was seen and --require of what is known, and cannot explain.</source>
+        <translation>Mit der Methode likelihood bekommt jeder Ort eine Wahrscheinlichkeit. Eine Methode nach Abstand nutzt nur, was zu sehen war, und vom Bekannten --require, und kann nichts erklären.</translation>
     </message>
     <message>
         <source>CRS in metres to work in.</source>
@@ -244,16 +252,16 @@
         <translation>Zellen</translation>
     </message>
     <message>
-        <source>Centre lines of streets to write as well (.parquet).</source>
-        <translation>Mittellinien von Straßen, die auch geschrieben werden (.parquet).</translation>
+        <source>Centre lines of streets to write (.parquet).</source>
+        <translation>Mittellinien von Straßen, die geschrieben werden (.parquet).</translation>
+    </message>
+    <message>
+        <source>Centre lines of streets, for maps, names of places and viewpoints near streets.</source>
+        <translation>Mittellinien von Straßen, für Karten, Namen von Orten und Standpunkte an Straßen.</translation>
     </message>
     <message>
         <source>Centre lines to draw below the map.</source>
         <translation>Mittellinien, die unter die Karte gezeichnet werden.</translation>
-    </message>
-    <message>
-        <source>Centre lines, for viewpoints near streets.</source>
-        <translation>Mittellinien, für Standpunkte an Straßen.</translation>
     </message>
     <message>
         <source>Chance</source>
@@ -348,10 +356,6 @@
         <translation>Datenbank, die geschrieben wird.</translation>
     </message>
     <message>
-        <source>Databases</source>
-        <translation>Datenbanken</translation>
-    </message>
-    <message>
         <source>Day of the view</source>
         <translation>Tag der Ansicht</translation>
     </message>
@@ -386,10 +390,6 @@
     <message>
         <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary or Panoramax JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: photographs, or folders of them.</source>
         <translation>Detektionen: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary oder Panoramax JSON, CVAT oder Pascal VOC XML, YOLO .txt mit data.yaml, KITTI .txt, CSV von Roboflow; oder ein Ordner. Mit --detector: Fotos oder Ordner mit Fotos.</translation>
-    </message>
-    <message>
-        <source>Detectors</source>
-        <translation>Detektoren</translation>
     </message>
     <message>
         <source>Direction of the camera, clockwise from north.</source>
@@ -752,8 +752,8 @@
         <translation>Die Engine von Semantische Signaturen wird installiert</translation>
     </message>
     <message>
-        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the area that OpenStreetMap files state.</source>
-        <translation>Nur behalten, was in diesem Rechteck in Grad, in den Polygonen einer Datei oder mit 'box' in dem Gebiet liegt, das Dateien von OpenStreetMap angeben.</translation>
+        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the box that OpenStreetMap files state; with 'none' keep all.</source>
+        <translation>Nur behalten, was in diesem Rechteck in Grad, in den Polygonen einer Datei oder mit 'box' in dem Rechteck liegt, das Dateien von OpenStreetMap angeben; mit 'none' alles behalten.</translation>
     </message>
     <message>
         <source>Keep the cells in this box in degrees, or in polygons.</source>
@@ -788,8 +788,8 @@
         <translation>Letzter bekannter Ort, in Grad oder als X,Y,SIGMA im KBS der Datenbank, SIGMA in Metern.</translation>
     </message>
     <message>
-        <source>Layer to write, by default cells, in a .gpkg all: cells, evaluation, evaluation_lines, hexagons, objects (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
-        <translation>Layer, der geschrieben wird, ohne Angabe cells, in einem .gpkg alle: cells, evaluation, evaluation_lines, hexagons, objects (mehrere sind möglich). In einem .tif, ohne Angabe ambiguity: ambiguity, error, field, identifiability.</translation>
+        <source>Layer to write, by default cells, in a .gpkg all: buildings, cells, evaluation, evaluation_lines, hexagons, objects, streets (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
+        <translation>Layer, der geschrieben wird, ohne Angabe cells, in einem .gpkg alle: buildings, cells, evaluation, evaluation_lines, hexagons, objects, streets (mehrere sind möglich). In einem .tif, ohne Angabe ambiguity: ambiguity, error, field, identifiability.</translation>
     </message>
     <message>
         <source>Layers</source>
@@ -808,6 +808,10 @@
         <translation>Rahmen mit einem kleineren Konfidenzwert weglassen.</translation>
     </message>
     <message>
+        <source>Letters of classes</source>
+        <translation>Buchstaben der Klassen</translation>
+    </message>
+    <message>
         <source>List the catalogues, or the layers of one.</source>
         <translation>Führt die Kataloge auf oder die Layer eines Katalogs.</translation>
     </message>
@@ -820,16 +824,16 @@
         <translation>Straßenobjekte laden</translation>
     </message>
     <message>
-        <source>Localization</source>
-        <translation>Verortung</translation>
-    </message>
-    <message>
         <source>Localize</source>
         <translation>Verorten</translation>
     </message>
     <message>
         <source>Localize a route</source>
         <translation>Weg verorten</translation>
+    </message>
+    <message>
+        <source>Look</source>
+        <translation>Ansehen</translation>
     </message>
     <message>
         <source>Looking for Python...</source>
@@ -866,6 +870,10 @@
     <message>
         <source>Margin of the regions</source>
         <translation>Rand der Gebiete</translation>
+    </message>
+    <message>
+        <source>Measure</source>
+        <translation>Messen</translation>
     </message>
     <message>
         <source>Measure how often, and how closely, queries from known places are located.</source>
@@ -1088,6 +1096,14 @@
         <translation>Genauigkeit vorhersagen</translation>
     </message>
     <message>
+        <source>Prepare</source>
+        <translation>Vorbereiten</translation>
+    </message>
+    <message>
+        <source>Print the letters of classes, such as DDBL for what a cell sees.</source>
+        <translation>Die Buchstaben der Klassen ausgeben, etwa DDBL für das, was eine Zelle sieht.</translation>
+    </message>
+    <message>
         <source>Print the properties of a database next to those in the paper.</source>
         <translation>Zeigt die Eigenschaften einer Datenbank neben denen im Aufsatz.</translation>
     </message>
@@ -1204,6 +1220,10 @@
         <translation>Berichtsseite</translation>
     </message>
     <message>
+        <source>Research</source>
+        <translation>Forschen</translation>
+    </message>
+    <message>
         <source>Resolution of hexagons</source>
         <translation>Auflösung der Sechsecke</translation>
     </message>
@@ -1248,8 +1268,8 @@
         <translation>Experiment ausführen</translation>
     </message>
     <message>
-        <source>Run every step on a small made-up city, offline.</source>
-        <translation>Führt jeden Schritt mit einer kleinen erfundenen Stadt aus, ohne Netz.</translation>
+        <source>Run every step on a small made-up town, offline.</source>
+        <translation>Führt jeden Schritt mit einem kleinen erfundenen Ort aus, ohne Netz.</translation>
     </message>
     <message>
         <source>Run the evaluations of an experiment, or resume them.</source>
@@ -1292,12 +1312,12 @@
         <translation>Startwert</translation>
     </message>
     <message>
-        <source>Seed of the city and the queries.</source>
-        <translation>Startwert der Stadt und der Anfragen.</translation>
-    </message>
-    <message>
         <source>Seed of the random numbers.</source>
         <translation>Startwert der Zufallszahlen.</translation>
+    </message>
+    <message>
+        <source>Seed of the town and the queries.</source>
+        <translation>Startwert des Ortes und der Anfragen.</translation>
     </message>
     <message>
         <source>Seen from here</source>
@@ -1576,6 +1596,10 @@
         <translation>Höchstens so viele Ansichten je Teil verwenden.</translation>
     </message>
     <message>
+        <source>Use the buildings and streets that `semsig load` wrote next to the street objects.</source>
+        <translation>Die Gebäude und Straßen nutzen, die `semsig load` neben die Straßenobjekte geschrieben hat.</translation>
+    </message>
+    <message>
         <source>Use the cache only.</source>
         <translation>Nur den Zwischenspeicher verwenden.</translation>
     </message>
@@ -1588,8 +1612,8 @@
         <translation>Standpunkte</translation>
     </message>
     <message>
-        <source>Viewpoints: every cell, outdoor cells or cells near streets (needs --streets).</source>
-        <translation>Standpunkte: alle Zellen (all), Zellen außerhalb der Gebäude (outdoor) oder Zellen an Straßen (streets, braucht --streets).</translation>
+        <source>Viewpoints: every cell, outdoor cells or cells near streets.</source>
+        <translation>Standpunkte: alle Zellen (all), Zellen außerhalb der Gebäude (outdoor) oder Zellen an Straßen (streets).</translation>
     </message>
     <message>
         <source>Views</source>
@@ -1656,6 +1680,10 @@
         <translation>Sechsecke dieser Auflösung von H3 schreiben, etwa 9, die Zellen, Objekte und Anfragen zusammenfassen.</translation>
     </message>
     <message>
+        <source>Write the buildings and streets of the source as well, next to --out.</source>
+        <translation>Auch die Gebäude und Straßen der Quelle schreiben, neben --out.</translation>
+    </message>
+    <message>
         <source>Years between the old objects and the new ones, for the report of --json.</source>
         <translation>Jahre zwischen den alten und den neuen Objekten, für den Bericht von --json.</translation>
     </message>
@@ -1682,6 +1710,10 @@
     <message>
         <source>as many cells as Paris</source>
         <translation>so viele Zellen wie Paris</translation>
+    </message>
+    <message>
+        <source>box where a file states one</source>
+        <translation>box, wo eine Datei eines angibt</translation>
     </message>
     <message>
         <source>by-hand for a view in words, photo for a view of sectors, panorama for a full turn with scores, otherwise generic</source>
@@ -1744,6 +1776,14 @@
         <translation>Name</translation>
     </message>
     <message>
+        <source>next to the street objects, if there are any</source>
+        <translation>neben den Straßenobjekten, falls es welche gibt</translation>
+    </message>
+    <message>
+        <source>outdoor where there are buildings, otherwise all</source>
+        <translation>outdoor, wo es Gebäude gibt, sonst all</translation>
+    </message>
+    <message>
         <source>over 99 %</source>
         <translation>über 99 %</translation>
     </message>
@@ -1782,6 +1822,14 @@
     <message>
         <source>the folder of the files, or the one of images next to it</source>
         <translation>der Ordner der Dateien oder der Ordner images daneben</translation>
+    </message>
+    <message>
+        <source>the name of --out with .buildings</source>
+        <translation>der Name von --out mit .buildings</translation>
+    </message>
+    <message>
+        <source>the name of --out with .streets</source>
+        <translation>der Name von --out mit .streets</translation>
     </message>
     <message>
         <source>the name of the database's file</source>

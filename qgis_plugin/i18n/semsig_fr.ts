@@ -4,10 +4,6 @@
 <context>
     <name>Semsig</name>
     <message>
-        <source>--explain, --share and the options from --noise to --objects work only with the likelihood method.</source>
-        <translation>--explain, --share et les options de --noise à --objects ne valent qu’avec la méthode likelihood.</translation>
-    </message>
-    <message>
         <source>0.9</source>
         <translation>0,9</translation>
     </message>
@@ -26,10 +22,6 @@
     <message>
         <source>A unique cell can be identified at once, one of a thousand cannot. The raster holds, for each cell, the number of cells that look the same. `semsig identify` gives more detail, and takes longer.</source>
         <translation>Une cellule unique se reconnaît aussitôt, une parmi mille non. Le raster contient, pour chaque cellule, le nombre de cellules qui se ressemblent. `semsig identify` en dit plus, et prend plus de temps.</translation>
-    </message>
-    <message>
-        <source>Accuracy</source>
-        <translation>Exactitude</translation>
     </message>
     <message>
         <source>Adapt the errors to the queries</source>
@@ -116,6 +108,10 @@
         <translation>Zone à garder</translation>
     </message>
     <message>
+        <source>Ask</source>
+        <translation>Interroger</translation>
+    </message>
+    <message>
         <source>Assume that views are from the area of the database. Otherwise the chance that they are from elsewhere is 50 % before their objects are compared.</source>
         <translation>Supposer que les vues viennent de la zone de la base. Sinon, la probabilité qu’elles viennent d’ailleurs est de 50 % avant que leurs objets soient comparés.</translation>
     </message>
@@ -160,12 +156,24 @@
         <translation>Emprises de bâtiments qui cachent ce qui est derrière elles.</translation>
     </message>
     <message>
-        <source>Building footprints to write as well (.parquet).</source>
-        <translation>Emprises de bâtiments à écrire aussi (.parquet).</translation>
+        <source>Building footprints to write (.parquet).</source>
+        <translation>Emprises de bâtiments à écrire (.parquet).</translation>
     </message>
     <message>
         <source>Buildings</source>
         <translation>Bâtiments</translation>
+    </message>
+    <message>
+        <source>Buildings and streets</source>
+        <translation>Bâtiments et rues</translation>
+    </message>
+    <message>
+        <source>Buildings and streets of the street objects</source>
+        <translation>Bâtiments et rues des objets de rue</translation>
+    </message>
+    <message>
+        <source>By likelihood, every place gets a chance. A method by distance takes only what was seen and --require of what is known, and cannot explain.</source>
+        <translation>Avec la méthode likelihood, chaque lieu reçoit une probabilité. Une méthode par distance n’utilise que ce qui a été vu et, de ce qui est connu, --require, et ne peut rien expliquer.</translation>
     </message>
     <message>
         <source>CRS in metres to work in.</source>
@@ -244,16 +252,16 @@
         <translation>Cellules</translation>
     </message>
     <message>
-        <source>Centre lines of streets to write as well (.parquet).</source>
-        <translation>Axes de rues à écrire aussi (.parquet).</translation>
+        <source>Centre lines of streets to write (.parquet).</source>
+        <translation>Axes de rues à écrire (.parquet).</translation>
+    </message>
+    <message>
+        <source>Centre lines of streets, for maps, names of places and viewpoints near streets.</source>
+        <translation>Axes de rues, pour les cartes, les noms des lieux et les points de vue près des rues.</translation>
     </message>
     <message>
         <source>Centre lines to draw below the map.</source>
         <translation>Axes à dessiner sous la carte.</translation>
-    </message>
-    <message>
-        <source>Centre lines, for viewpoints near streets.</source>
-        <translation>Axes, pour les points de vue près des rues.</translation>
     </message>
     <message>
         <source>Chance</source>
@@ -348,10 +356,6 @@
         <translation>Base à écrire.</translation>
     </message>
     <message>
-        <source>Databases</source>
-        <translation>Bases</translation>
-    </message>
-    <message>
         <source>Day of the view</source>
         <translation>Jour de la vue</translation>
     </message>
@@ -386,10 +390,6 @@
     <message>
         <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary or Panoramax JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: photographs, or folders of them.</source>
         <translation>Détections : JSON de COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary ou Panoramax, XML de CVAT ou Pascal VOC, .txt de YOLO avec data.yaml, .txt de KITTI, CSV de Roboflow ; ou un dossier. Avec --detector : des photos, ou des dossiers de photos.</translation>
-    </message>
-    <message>
-        <source>Detectors</source>
-        <translation>Détecteurs</translation>
     </message>
     <message>
         <source>Direction of the camera, clockwise from north.</source>
@@ -752,8 +752,8 @@
         <translation>Installation du moteur de Signatures sémantiques</translation>
     </message>
     <message>
-        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the area that OpenStreetMap files state.</source>
-        <translation>Ne garder que ce qui est dans cette emprise en degrés, dans les polygones d’un fichier, ou avec 'box' dans la zone que les fichiers OpenStreetMap indiquent.</translation>
+        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the box that OpenStreetMap files state; with 'none' keep all.</source>
+        <translation>Ne garder que ce qui est dans cette emprise en degrés, dans les polygones d’un fichier, ou avec 'box' dans l’emprise que les fichiers OpenStreetMap indiquent ; avec 'none', tout garder.</translation>
     </message>
     <message>
         <source>Keep the cells in this box in degrees, or in polygons.</source>
@@ -788,8 +788,8 @@
         <translation>Dernier lieu connu, en degrés ou sous la forme X,Y,SIGMA dans le SCR de la base, SIGMA en mètres.</translation>
     </message>
     <message>
-        <source>Layer to write, by default cells, in a .gpkg all: cells, evaluation, evaluation_lines, hexagons, objects (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
-        <translation>Couche à écrire, par défaut cells, dans un .gpkg toutes : cells, evaluation, evaluation_lines, hexagons, objects (plusieurs sont possibles). Dans un .tif, par défaut ambiguity : ambiguity, error, field, identifiability.</translation>
+        <source>Layer to write, by default cells, in a .gpkg all: buildings, cells, evaluation, evaluation_lines, hexagons, objects, streets (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
+        <translation>Couche à écrire, par défaut cells, dans un .gpkg toutes : buildings, cells, evaluation, evaluation_lines, hexagons, objects, streets (plusieurs sont possibles). Dans un .tif, par défaut ambiguity : ambiguity, error, field, identifiability.</translation>
     </message>
     <message>
         <source>Layers</source>
@@ -808,6 +808,10 @@
         <translation>Omettre les cadres d’un score inférieur.</translation>
     </message>
     <message>
+        <source>Letters of classes</source>
+        <translation>Lettres des classes</translation>
+    </message>
+    <message>
         <source>List the catalogues, or the layers of one.</source>
         <translation>Énumère les catalogues, ou les couches de l’un d’eux.</translation>
     </message>
@@ -820,16 +824,16 @@
         <translation>Charger les objets de rue</translation>
     </message>
     <message>
-        <source>Localization</source>
-        <translation>Localisation</translation>
-    </message>
-    <message>
         <source>Localize</source>
         <translation>Localiser</translation>
     </message>
     <message>
         <source>Localize a route</source>
         <translation>Localiser un trajet</translation>
+    </message>
+    <message>
+        <source>Look</source>
+        <translation>Regarder</translation>
     </message>
     <message>
         <source>Looking for Python...</source>
@@ -866,6 +870,10 @@
     <message>
         <source>Margin of the regions</source>
         <translation>Marge des régions</translation>
+    </message>
+    <message>
+        <source>Measure</source>
+        <translation>Mesurer</translation>
     </message>
     <message>
         <source>Measure how often, and how closely, queries from known places are located.</source>
@@ -1088,6 +1096,14 @@
         <translation>Prédire l’exactitude</translation>
     </message>
     <message>
+        <source>Prepare</source>
+        <translation>Préparer</translation>
+    </message>
+    <message>
+        <source>Print the letters of classes, such as DDBL for what a cell sees.</source>
+        <translation>Afficher les lettres des classes, comme DDBL pour ce que voit une cellule.</translation>
+    </message>
+    <message>
         <source>Print the properties of a database next to those in the paper.</source>
         <translation>Montre les propriétés d’une base à côté de celles de l’article.</translation>
     </message>
@@ -1204,6 +1220,10 @@
         <translation>Page de rapport</translation>
     </message>
     <message>
+        <source>Research</source>
+        <translation>Rechercher</translation>
+    </message>
+    <message>
         <source>Resolution of hexagons</source>
         <translation>Résolution des hexagones</translation>
     </message>
@@ -1248,8 +1268,8 @@
         <translation>Exécuter une expérience</translation>
     </message>
     <message>
-        <source>Run every step on a small made-up city, offline.</source>
-        <translation>Exécute chaque étape sur une petite ville inventée, sans réseau.</translation>
+        <source>Run every step on a small made-up town, offline.</source>
+        <translation>Exécute chaque étape sur un petit bourg inventé, sans réseau.</translation>
     </message>
     <message>
         <source>Run the evaluations of an experiment, or resume them.</source>
@@ -1292,12 +1312,12 @@
         <translation>Graine</translation>
     </message>
     <message>
-        <source>Seed of the city and the queries.</source>
-        <translation>Graine de la ville et des requêtes.</translation>
-    </message>
-    <message>
         <source>Seed of the random numbers.</source>
         <translation>Graine des nombres aléatoires.</translation>
+    </message>
+    <message>
+        <source>Seed of the town and the queries.</source>
+        <translation>Graine du bourg et des requêtes.</translation>
     </message>
     <message>
         <source>Seen from here</source>
@@ -1576,6 +1596,10 @@
         <translation>Utiliser au plus ce nombre de vues par ensemble.</translation>
     </message>
     <message>
+        <source>Use the buildings and streets that `semsig load` wrote next to the street objects.</source>
+        <translation>Utiliser les bâtiments et les rues que `semsig load` a écrits à côté des objets de rue.</translation>
+    </message>
+    <message>
         <source>Use the cache only.</source>
         <translation>N’utiliser que le cache.</translation>
     </message>
@@ -1588,8 +1612,8 @@
         <translation>Points de vue</translation>
     </message>
     <message>
-        <source>Viewpoints: every cell, outdoor cells or cells near streets (needs --streets).</source>
-        <translation>Points de vue : chaque cellule (all), les cellules en extérieur (outdoor) ou les cellules près des rues (streets, avec --streets).</translation>
+        <source>Viewpoints: every cell, outdoor cells or cells near streets.</source>
+        <translation>Points de vue : chaque cellule (all), les cellules en extérieur (outdoor) ou les cellules près des rues (streets).</translation>
     </message>
     <message>
         <source>Views</source>
@@ -1656,6 +1680,10 @@
         <translation>Écrire des hexagones de cette résolution de H3, comme 9, qui résument cellules, objets et requêtes.</translation>
     </message>
     <message>
+        <source>Write the buildings and streets of the source as well, next to --out.</source>
+        <translation>Écrire aussi les bâtiments et les rues de la source, à côté de --out.</translation>
+    </message>
+    <message>
         <source>Years between the old objects and the new ones, for the report of --json.</source>
         <translation>Années entre les anciens objets et les nouveaux, pour le rapport de --json.</translation>
     </message>
@@ -1682,6 +1710,10 @@
     <message>
         <source>as many cells as Paris</source>
         <translation>autant de cellules que Paris</translation>
+    </message>
+    <message>
+        <source>box where a file states one</source>
+        <translation>box, là où un fichier en indique une</translation>
     </message>
     <message>
         <source>by-hand for a view in words, photo for a view of sectors, panorama for a full turn with scores, otherwise generic</source>
@@ -1744,6 +1776,14 @@
         <translation>nom</translation>
     </message>
     <message>
+        <source>next to the street objects, if there are any</source>
+        <translation>à côté des objets de rue, s’il y en a</translation>
+    </message>
+    <message>
+        <source>outdoor where there are buildings, otherwise all</source>
+        <translation>outdoor là où il y a des bâtiments, sinon all</translation>
+    </message>
+    <message>
         <source>over 99 %</source>
         <translation>plus de 99 %</translation>
     </message>
@@ -1782,6 +1822,14 @@
     <message>
         <source>the folder of the files, or the one of images next to it</source>
         <translation>le dossier des fichiers, ou celui des images à côté</translation>
+    </message>
+    <message>
+        <source>the name of --out with .buildings</source>
+        <translation>le nom de --out avec .buildings</translation>
+    </message>
+    <message>
+        <source>the name of --out with .streets</source>
+        <translation>le nom de --out avec .streets</translation>
     </message>
     <message>
         <source>the name of the database's file</source>
