@@ -19,7 +19,7 @@ from PIL import Image
 
 import semsig_gis
 from semsig_gis.cli.app import printing_of
-from semsig_gis.commands import commands
+from semsig_gis.commands import OUTPUT, PANELS, commands
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -180,15 +180,18 @@ def command_page(item: Command) -> str:
         f"# `{name}`\n\n{marked(item.help)}\n",
         f"```text\n{usage}\n```\n\n```{{program}} {name}\n```\n",
     ]
-    sections: dict[str, list[str]] = {"Arguments": [], "Options": [], "More options": []}
+    usual: dict[str, list[str]] = {panel: [] for panel in PANELS}
+    advanced: list[str] = []
     for field in [*item.fields, *printing_of(item)]:
-        option = field.option
-        heading = "More options" if option.advanced else "Options"
-        sections["Arguments" if option.positional else heading].append(option_text(field))
-    sections["Options"].append(f"````{{option}} --help\n{HELP}\n````\n")
-    for heading, texts in sections.items():
+        texts = advanced if field.option.advanced else usual[field.panel]
+        texts.append(option_text(field))
+    usual[OUTPUT].append(f"````{{option}} --help\n{HELP}\n````\n")
+    for heading, texts in {**usual, "More options": advanced}.items():
         if texts:
             parts += [f"## {heading}\n", *texts]
+    if item.examples:
+        lines = "\n".join(item.examples)
+        parts.append(f"## Examples\n\n```text\n{lines}\n```\n")
     return "\n".join(parts)
 
 

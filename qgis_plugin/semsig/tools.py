@@ -64,7 +64,7 @@ _TOOLS = (
         },
     ),
     # Many queries are answered with a line of JSON each, which is for other programs.
-    Tool("localize", "localize", hidden=("more", "queries", "adapt")),
+    Tool("localize", "localize", hidden=("more", "queries", "adapt", "symbols")),
     Tool(
         "evaluate",
         "evaluate",

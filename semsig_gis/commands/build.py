@@ -251,12 +251,8 @@ class Build:
         return f"with the {' and '.join(found)} of {files}{effect} (--no-ground: without them)"
 
     def _summary(self, cells: int, entries: int, mode: str) -> Iterator[str]:
-        from semsig_gis.database import open_city
-
-        size = open_city(self.out).bytes / 1e6
         where = {"all": "", "outdoor": " outside buildings", "streets": " along streets"}
         yield (
             f"{cells:,} cells of {self.step:g} m{where[mode]} see "
-            f"{entries / cells:.1f} street objects on average, up to {self.radius:g} m away, in "
-            f"{size:.1f} MB."
+            f"{entries / cells:.1f} street objects on average, up to {self.radius:g} m away."
         )

@@ -22,7 +22,7 @@ from semsig_gis.commands.options import (
     city_name,
     read_noise,
 )
-from semsig_gis.core import LIKELIHOOD, InputError, Table
+from semsig_gis.core import LIKELIHOOD, InputError, Table, percent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -172,7 +172,7 @@ class Evaluate:
         files = {"results": self.out, "report": self.report}
         return Result(
             values=values,
-            summary=self._summary(evaluation),
+            summary=self._summary(evaluation, foreign),
             tables=self._tables(evaluation, foreign),
             files={what: path for what, path in files.items() if path is not None},
         )
@@ -217,10 +217,14 @@ class Evaluate:
         )
         return build_index(city.database, noise)
 
-    def _summary(self, evaluation: Evaluation) -> Iterator[str]:
+    def _summary(self, evaluation: Evaluation, foreign: pd.DataFrame | None) -> Iterator[str]:
         from semsig_gis.output import evaluation_headline
 
         yield evaluation_headline(evaluation)
+        if foreign is not None:
+            number = int(foreign["foreign"].sum())
+            answered = (foreign["foreign"] * foreign["answered_foreign"]).sum() / number
+            yield f"Of {number:,} views of the other city, {percent(answered, 1)} were answered."
 
     def _tables(self, evaluation: Evaluation, foreign: pd.DataFrame | None) -> Iterator[Table]:
         from semsig_gis.output import evaluation_tables

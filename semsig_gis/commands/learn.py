@@ -135,6 +135,12 @@ class Learn:
         save_noise(estimate.noise, self.out)
 
         def summary() -> Iterator[str]:
+            skipped = estimate.skipped
+            nothing = f"; {skipped:,} samples are at places that see nothing" if skipped else ""
+            yield (
+                f"Learnt from {estimate.detections:,} detections at {estimate.samples:,} places "
+                f"that see {estimate.objects:,} objects{nothing}."
+            )
             if self.map_age:
                 yield self._correction(learnt, fresh)
             yield _verdict(estimate)
@@ -252,11 +258,8 @@ def sample_places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDA
 def _rate_table(estimate: NoiseEstimate) -> Table:
     from semsig_gis.localization import ALL
 
-    skipped = estimate.skipped
-    skipped_text = f"; {skipped} samples are at places that see nothing" if skipped else ""
     return Table.of(
-        f"Learnt from {estimate.detections:,} detections at {estimate.samples:,} places that see "
-        f"{estimate.objects:,} objects{skipped_text}",
+        "Errors of the detector",
         ("quantity", "class", "value", "own samples only", "95% interval", "samples"),
         [
             _rate(row)
@@ -294,6 +297,6 @@ def _verdict(estimate: NoiseEstimate) -> str:
     if few:
         text += (
             f"; these classes have fewer than 8 samples for some quantity, where they are mostly "
-            f"given the values of all classes: {', '.join(few)}"
+            f"given the values of all classes: {', '.join(few).replace('_', ' ')}"
         )
     return f"{text}."

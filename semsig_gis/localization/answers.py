@@ -14,6 +14,7 @@ from typing_extensions import TypedDict
 
 from semsig_gis.core import (
     LICENSES,
+    WILDCARD,
     Displayed,
     InputError,
     SignatureRecord,
@@ -241,22 +242,22 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     if not len(query):
         return ("nothing was seen, which says little about the place.", *notes)
     if isinstance(query, View) and query.bearings is not None and len(outside := query.outside()):
-        symbols = "?" * len(query) if query.codes is None else taxonomy.decode(query.codes)
+        codes = np.full(len(query), WILDCARD) if query.codes is None else query.codes
         listed = ", ".join(
-            f"{symbols[row]} at {query.bearings[row]:.1f}°" for row in outside.tolist()
+            f"{taxonomy.words([codes[row]])} at {query.bearings[row]:.1f}°"
+            for row in outside.tolist()
         )
         note = (
             f"{listed} {'is' if len(outside) == 1 else 'are'} outside the sectors that were looked "
             "at; the heading, the field of view or the bearing may be wrong."
         )
         notes = (note, *notes)
-    codes = [] if query.codes is None else query.codes[~query.among(present)].tolist()
-    if not codes:
+    lacking = [] if query.codes is None else query.codes[~query.among(present)].tolist()
+    if not lacking:
         return notes
-    lacking = map(taxonomy.by_code, dict.fromkeys(codes))
-    legend = " and no ".join(f"{item.title.lower()} ({item.symbol})" for item in lacking)
-    used = "this object was" if len(codes) == 1 else f"these {len(codes)} objects were"
-    return (f"the map has no {legend}, so {used} not used.", *notes)
+    names = " and no ".join(taxonomy.words([code]) for code in dict.fromkeys(lacking))
+    used = "this object was" if len(lacking) == 1 else f"these {len(lacking)} objects were"
+    return (f"the map has no {names}, so {used} not used.", *notes)
 
 
 class DoubtRecord(TypedDict):

@@ -32,9 +32,61 @@ def test_rows_are_printed_without_markup_or_folding(capsys: pytest.CaptureFixtur
     rows = [("[red]a[/red]", 1234567, 7652000627500), ("x" * 300, -1, 0)]
     console.print_table(Table.of("[b]title[/b]", ("name", "count", "id"), rows))
     out = capsys.readouterr().out
-    # A pipe has no width, so nothing is folded.
-    for text in ("[b]title[/b]", "[red]a[/red]", "1,234,567", " 7652000627500 ", "x" * 300):
+    for text in ("[b]title[/b]", "[red]a[/red]", "1,234,567", " 7652000627500 "):
         assert text in out
+    assert out.count("x") == 300
+    assert max(map(len, out.splitlines())) <= console.PIPED_WIDTH
+
+
+PLACES = Table.of(
+    "12 places of 1,234,567 cells in a city that has a long name, by a method with a long name",
+    ("rank", "cell", "x", "y", "lat", "lon", "share", "seen from there"),
+    [
+        (
+            1,
+            3728500484285,
+            "372875.0",
+            "4842825.0",
+            "43.727858",
+            "7.421317",
+            "0.1 to 0.2",
+            "tree " * 9,
+        )
+    ]
+    * 2,
+    minor=("cell", "x", "y"),
+)
+
+
+@pytest.mark.parametrize("width", [200, 80, 40])
+def test_a_narrow_terminal_leaves_out_columns_and_folds_no_number(
+    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    console.print_table(PLACES)
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= width
+    rows = [line for line in lines if line.startswith("│") and " 1 " in line]
+    shown = [text for text in PLACES.rows[0] if all(f" {text} " in row for row in rows)]
+    left_out = "\n".join(lines).partition("lack of room: ")[2].replace("\n", " ")
+    expected = {
+        200: (PLACES.rows[0], ""),
+        80: (("1", "43.727858", "7.421317", "0.1 to 0.2"), "cell, x, y."),
+        40: (("1", "43.727858", "7.421317"), "cell, x, y, share, seen from there."),
+    }
+    assert (tuple(shown), left_out) == expected[width]
+    assert "1,234,567" in "\n".join(lines)
+
+
+def test_sentences_are_wrapped_between_words_and_commands_are_not(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "30")
+    command = f"  semsig localize city.parquet '{'bench at 40, ' * 4}'"
+    console.say_sentence(f"Of 1,234,567 views, 12,345,678 were placed. Next:\n{command}")
+    assert capsys.readouterr().out == (
+        f"Of 1,234,567 views, 12,345,678\nwere placed. Next:\n{command}\n"
+    )
 
 
 HOSTILE = "a\x1b[2J\x1b]0;title\x07\u009b31m\u202eb\r\ud83d"
@@ -76,6 +128,7 @@ def test_quiet_and_verbose_change_the_remarks(
     assert re.fullmatch(expected, err)
     assert console.talk.get() == "plain"
     sentence(run("draft x.gpkg --quiet --verbose"), "--quiet and --verbose", "give one")
+    sentence(run("draft x.gpkg --quiet --tables"), "--quiet and --tables", "give one")
 
 
 @pytest.mark.parametrize(

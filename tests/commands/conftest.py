@@ -52,6 +52,7 @@ def tiny_city(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "samples.csv": SAMPLES,
         "route.jsonl": '{"types": "D"}\n{"types": "D", "dx": 10, "dy": 0, "sigma": 1}\n',
         "boxes.json": json.dumps(BOXES),
+        "photo.jpg": "a picture",
         "spec.toml": SPEC,
     }.items():
         (folder / name).write_text(text, encoding="utf-8")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -55,12 +57,19 @@ def test_load_build_and_localize(run_ok: RunOk) -> None:
     assert (lights["read"], lights["collapsed"], lights["kept"]) == (21, 1, 20)
     assert (crossings["read"], crossings["filtered"], crossings["kept"]) == (2, 1, 1)
     out = run_ok(LOAD)
+    assert out.startswith("21 street objects of 2 classes on ")
+    assert "street light (20), crossing (1)." in out
+    assert out.endswith("street objects: o.parquet\n")
+    out = run_ok(LOAD, "--tables")
     assert "per km² of hull" in out
     assert "Nobody (CC0-1.0): lights, crossings" in out
-    assert "cells of mean length" in run_ok("build o.parquet --out c.parquet")
+    assert " street objects on average, " in run_ok("build o.parquet --out c.parquet")
     assert "Nobody (CC0-1.0)" in str(json.loads(run_ok("info c.parquet --json")))
     out = run_ok("info c.parquet")
-    assert "Street light (D)" in out
+    assert "Seen: street light, crossing." in out
+    assert "Data: Nobody (CC0-1.0)." in out
+    out = run_ok("info c.parquet --symbols --tables")
+    assert "street light (D)" in out
     assert "Nobody (CC0-1.0): lights, crossings" in out
 
     query = "localize c.parquet --types DX --bearings 200,20"
@@ -71,7 +80,12 @@ def test_load_build_and_localize(run_ok: RunOk) -> None:
     best = answer["candidates"][0]
     # The only crossing is at x = 770010, y = 6280010.
     assert max(abs(best["x"] - 770010), abs(best["y"] - 6280010)) <= 30
-    assert "by likelihood (generic noise)" in run_ok(query, "--map", "query.html")
+    assert "(noise: generic)" not in run_ok(query, "--map", "query.html")
+    out = run_ok(query, "-v")
+    assert "(noise: generic)" in out
+    assert re.search(r"│ (\d × )?street light", out)
+    assert re.search(r"│ [DX]+ +│", run_ok(query, "--tables --symbols"))
+    assert "https://www.openstreetmap.org/?mlat=" in out
     assert "leaflet" in text("query.html").lower()
 
 
@@ -84,12 +98,12 @@ def test_evaluate_and_map(run_ok: RunOk) -> None:
     assert summary.pop("timing")["seconds_per_query"] > 0
     assert json.loads(text("eval/evaluation.json")) == summary
     out = run_ok(line, "--report", "eval.html")
-    assert out.startswith(f"{summary['results']['p_error_within_m']['50']:.0%}".rstrip("%"))
+    assert f"Of 30 views, {summary['results']['p_error_within_m']['50']:.0%}".rstrip("%") in out
     assert "report: eval.html" in out
     page = text("eval.html")
     assert f"semsig {line} --report eval.html" in page
     assert '<h1 dir="auto">City: how well queries are placed</h1>' in page
-    assert "queries were placed within 50 m" in page
+    assert "were placed within 50 m" in page
     assert "map.html" in run_ok("map city.parquet --evaluation eval --out map.html")
     assert Path("map.html").stat().st_size > 1000
 
@@ -108,7 +122,7 @@ def test_distortion_of_the_crs_is_reported_and_limited(run: Run, run_ok: RunOk) 
     assert (plane["angle"], plane["stretch"]) == pytest.approx((0.63, 3e-4), abs=0.01)
     loaded = json.loads(run_ok(f"{LOAD} --json"))["distortion"]
     assert loaded["angle"] == pytest.approx(plane["angle"], abs=0.01)
-    assert "at most 0.63° off true north" in run_ok("info city.parquet")
+    assert "at most 0.63° off true north" in run_ok("info city.parquet --tables")
 
 
 @pytest.mark.parametrize("tiles", ["", "--tile 200"])
@@ -129,8 +143,8 @@ def test_warnings_of_load_are_stored_with_the_data(
     run_ok(f"build o.parquet --out {target} {tiles}")
     notes = [absent, f"lights: {few}"]
     assert json.loads(run_ok(f"info {target} --json"))["notes"] == notes
-    printed = run_ok(f"info {target}")
-    assert all(note in printed for note in notes)
+    printed = run_ok(f"info {target} --tables").replace("│\n│", "")
+    assert all(note in " ".join(printed.split()) for note in notes)
 
 
 @pytest.mark.usefixtures("city")
@@ -152,10 +166,11 @@ def test_sources_lists_catalogues(run_ok: RunOk, monkeypatch: pytest.MonkeyPatch
     assert (vienna["place"], vienna["license"]) == ("Vienna, Austria", "CC BY 4.0")
     assert catalogs["washington"]["classes"][0] == "alignment_tree"
     monkeypatch.delenv("MAPILLARY_ACCESS_TOKEN", raising=False)
-    assert "a token (MAPILLARY_ACCESS_TOKEN, not set)" in run_ok("sources")
+    assert "(MAPILLARY_ACCESS_TOKEN, not set)" in run_ok("sources")
     monkeypatch.setenv("MAPILLARY_ACCESS_TOKEN", "MLY|secret")
     out = run_ok("sources mapillary")
     assert "place: world; needs files, or an area" in out
+    assert "Classes: " in out
     assert "secret" not in out
     assert "osm_file" in listed["readers"]
     for line, words in {
@@ -168,7 +183,7 @@ def test_sources_lists_catalogues(run_ok: RunOk, monkeypatch: pytest.MonkeyPatch
         "sources tiny.toml --json": ('"title": "A tiny city"',),
         "draft lights.gpkg": ("[[layers]]", 'files = ["lights.gpkg"]'),
     }.items():
-        out = run_ok(line)
+        out = run_ok(line, *([] if "draft" in line or "--json" in line else ["--tables"]))
         assert all(word in out for word in words), line
 
 
@@ -209,7 +224,7 @@ def test_options_select_layers_of_openstreetmap(city: Path, run_ok: RunOk) -> No
         unread = {item["name"]: item["objects"] for item in report["unread"]}
         counts = (report["objects"], unread.get("crossings"), unread.get("clocks"))
         assert counts == (objects, crossings, clocks), options
-    out = run_ok(f"{line} --paper-classes")
+    out = run_ok(f"{line} --paper-classes --tables")
     assert "Layers not read" in out
     assert "pedestrian_crossing" not in out.partition("No objects of")[2].partition("Rows by")[0]
     assert "--layer +NAME" in out
@@ -225,7 +240,8 @@ def test_openstreetmap_with_its_surroundings(city: Path, run: Run, run_ok: RunOk
         way(9, [1, 2, 3, 1], {"building": "yes"}),
     )
     surroundings = "--out o.parquet --buildings b.parquet --streets s.parquet"
-    assert "EPSG:32632" in run_ok(f"load town.osm --catalog openstreetmap {surroundings}")
+    line = f"load town.osm --catalog openstreetmap {surroundings} --tables"
+    assert "EPSG:32632" in run_ok(line)
     assert list(gpd.read_parquet("b.parquet").geom_type) == ["Polygon"]
     assert list(gpd.read_parquet("s.parquet").geom_type) == ["LineString"]
     load = "load extract.osm --catalog openstreetmap --out o.parquet --json"
@@ -299,11 +315,27 @@ def test_fetch_from_a_portal_and_offline_from_the_cache(city: Path, run: Run) ->
     sentence(run(fetch, "5,48,6,49", "--offline"), "127.0.0.1")
 
 
-def test_demo_writes_a_map_layers_and_a_database(tmp_path: Path, run_ok: RunOk) -> None:
-    out = run_ok("demo --queries 5 --out", tmp_path / "demo")
-    for name in ("map.html", "city.gpkg", "city.parquet"):
-        assert name in out
+def test_demo_shows_an_answer_a_doubt_and_a_command_to_type(
+    tmp_path: Path, run_ok: RunOk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    out = run_ok("demo --queries 5")
+    for name in ("place.html", "map.html", "report.html", "city.gpkg", "city.parquet"):
+        assert f": demo/{name}\n" in out
         assert (tmp_path / "demo" / name).stat().st_size > 0
+    said = " ".join(out.split())
+    assert said.startswith("A made-up town: ")
+    assert said.count("you would see: ") == said.count("semsig says: ") == 2
+    assert re.search(r"within 50 m with a chance of [^.]* %\. In truth, it is \d+ m off\.", said)
+    assert "semsig says: Cannot tell." in said
+    assert "Of 5 views, " in said
+    # The command to type gives the answer that was shown.
+    (line,) = [line for line in out.splitlines() if line.startswith("  semsig localize ")]
+    _, *words = shlex.split(line)
+    answer = run_ok("", *words)
+    assert " ".join(answer.split()).partition(" with ")[0] in said
+    page = text("demo/place.html")
+    assert "Street " in page
 
 
 def test_version_imports_no_slow_libraries() -> None:
@@ -347,8 +379,8 @@ def test_query_imports_no_tables_or_maps_and_writes_no_files(city: Path, options
 def test_companion_files_are_listed_and_removed(city: Path, run_ok: RunOk) -> None:
     old = city / "city.parquet.generic-8d47.likelihood"
     old.write_bytes(b"1" * 300_000)
-    assert "likelihood index of an older version" in run_ok("info city.parquet")
-    files = json.loads(run_ok("info city.parquet --json"))["beside"]
+    assert "likelihood index of an older version" in run_ok("info city.parquet --tables")
+    files = json.loads(run_ok("info city.parquet --json"))["files"]
     assert [(file["what"], file["needed"]) for file in files] == [
         ("street objects", True),
         ("likelihood index of an older version", False),
@@ -375,9 +407,9 @@ def test_likelihood_is_evaluated_and_drawn(run_ok: RunOk) -> None:
     summary = json.loads(run_ok(line, "--out", "eval", "--json"))
     assert summary["settings"]["method"] == "likelihood:light:on_grid"
     assert 0 <= summary["results"]["coverage"] <= 1
-    assert "Answered" in run_ok(line)
+    assert "Answered" in run_ok(line, "--tables")
     run_ok("map city.parquet --evaluation eval --out map.html")
-    assert "likelihood:light:on_grid" in text("map.html")
+    assert "likelihood, noise: light" in text("map.html")
 
 
 def test_many_queries_are_answered_line_by_line(
@@ -404,12 +436,13 @@ def test_sentence_is_printed_as_understood(run_ok: RunOk, method: str) -> None:
     assert (view["types"], view["bearings"]) == ("DXD", [80.0, 120.0, 200.0])
     assert view["ranges"] == [pytest.approx(7.3, abs=0.1), pytest.approx(25, abs=1), None]
     assert view["sectors"] == [[55.0, 125.0]]
-    notes = ["D at 200.0° is outside the sectors"]
+    notes = ["street light at 200.0° is outside the sectors"]
     notes += ["edit+edit does not use ranges and sectors"] if method == "edit+edit" else []
     for note, words in zip(answer["notes"], notes, strict=True):
         assert words in note
     out = run_ok(*query)
-    assert "Seen: D 80° 7.28 m ± 56 %, X 120° 25.2 m ± 28 %, D 200°; looked at 55-125°." in out
+    seen = "street light at 80° 7.3 m away, crossing at 120° 25 m away, street light at 200°"
+    assert f"Seen: {seen}; looked at 55 to 125°." in " ".join(out.split())
     # The query in an answer can be given again.
     Path("queries.jsonl").write_text(json.dumps(view | {"id": "again"}))
     noise = ("--noise", "by-hand") if method == "likelihood" else ()
@@ -431,7 +464,7 @@ def test_every_query_has_an_answer_or_an_error(city: Path, run: Run, method: str
     assert [answer["line"] for answer in answers] == [1, 2, 3, 4]
     assert [answer["id"] for answer in answers] == [1, 2, "\ud800", 4]
     assert ["error" in answer for answer in answers] == [False, True, True, False]
-    assert "crossing (X)" in answers[0]["notes"][0]
+    assert "the map has no crossing, " in answers[0]["notes"][0]
     assert "nothing was seen" in answers[3]["notes"][0]
     (city / "queries.jsonl").write_text(rows[1])
     code, out, err = run(*batch)
@@ -444,7 +477,8 @@ def test_every_query_has_an_answer_or_an_error(city: Path, run: Run, method: str
 @pytest.mark.usefixtures("city")
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
 @pytest.mark.parametrize(
-    ("view", "words"), [("--types X", "crossing (X)"), ("--bearings=", "nothing was seen")]
+    ("view", "words"),
+    [("--types X", "the map has no crossing, "), ("--bearings=", "nothing was seen")],
 )
 def test_unknown_class_and_empty_query_are_answered(
     run_ok: RunOk, method: str, view: str, words: str
@@ -452,7 +486,7 @@ def test_unknown_class_and_empty_query_are_answered(
     query = f"localize few.parquet {view} --method {method}"
     (note,) = json.loads(run_ok(f"{query} --json"))["notes"]
     assert words in note
-    assert f"Note: {note}" in run_ok(query)
+    assert f"Note: {note}" in " ".join(run_ok(query).split())
 
 
 def test_buildings_streets_and_area_select_cells(city: Path, run: Run, run_ok: RunOk) -> None:
@@ -476,7 +510,7 @@ def test_buildings_streets_and_area_select_cells(city: Path, run: Run, run_ok: R
         "wide": "--streets streets.geojson --viewpoints streets --street-width 40",
         "area": "--area area.parquet",
     }.items():
-        assert "cells of mean length" in run_ok(f"{build} {options}")
+        assert " street objects on average, " in run_ok(f"{build} {options}")
         database = open_database("narrow.parquet")
         cells[name], entries[name] = len(database), int(database.lengths.sum())
     assert cells["outdoor"] < cells["buildings"] <= cells["all"]

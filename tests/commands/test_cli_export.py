@@ -22,7 +22,7 @@ from semsig_gis.evaluation import save_evaluation, save_identifiability
 from semsig_gis.localization import Localization, localize
 from semsig_gis.objects import open_objects, save_objects
 from semsig_gis.observation import parse_view
-from semsig_gis.output import answer_tables, cell_errors
+from semsig_gis.output import answer_summary, cell_errors
 
 if TYPE_CHECKING:
     from conftest import Run, RunOk
@@ -80,7 +80,7 @@ def test_regions_to_search_are_written(method: str, run_ok: RunOk) -> None:
     types = small_city()[0].types(7)
     line = f"localize city.parquet --types {types} --method {method} --out answer.gpkg"
     out = run_ok(line, "--within", 15)
-    assert "km2" in out
+    assert "km²" in out
     assert "% of the city" in out
     searched = json.loads(run_ok(line, "--json"))["searched"]
     regions = gpd.read_file("answer.gpkg", layer="regions")
@@ -112,7 +112,7 @@ def test_number_of_ties_is_printed(tied: int, words: str) -> None:
     query = parse_view({"types": "D"}, taxonomy=database.taxonomy, radius=30.0)
     answer = localize(database, query, method="types:edit", top=1)
     assert isinstance(answer, Localization)
-    parts = answer_tables(dataclasses.replace(answer, tied_beyond=tied))
+    parts = answer_summary(dataclasses.replace(answer, tied_beyond=tied))
     assert any(str(part).startswith(words) for part in parts)
 
 

@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import shlex
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jsonschema
@@ -19,7 +20,6 @@ from semsig_gis.commands.schema import command_schema
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
 
     from conftest import Run
     from semsig_gis.commands import Field
@@ -170,11 +170,54 @@ def test_verbose_reports_on_standard_error(name: str, run: Run) -> None:
     assert all(line.startswith("semsig: ") for line in err.splitlines())
 
 
+@pytest.mark.usefixtures("unchanged")
+@pytest.mark.parametrize(
+    ("name", "field"), fields(lambda field: field.suffixes and field.suffixes != ("",))
+)
+def test_missing_folder_is_not_made(name: str, field: Field, run: Run) -> None:
+    path = f"nowhere/a{field.suffixes[0]}"
+    sentence(run("", *line_of(name, **{field.name: path})), path, "there is no folder nowhere")
+
+
+EXAMPLES = [(name, line) for name, command in COMMANDS.items() for line in command.examples]
+
+
+def test_every_command_has_two_examples() -> None:
+    assert {name: len(command.examples) for name, command in COMMANDS.items()} == dict.fromkeys(
+        COMMANDS, 2
+    )
+
+
+@pytest.mark.usefixtures("unchanged")
+@pytest.mark.parametrize(("name", "line"), EXAMPLES)
+def test_example_in_the_help_is_understood(
+    name: str, line: str, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    requests: list[Any] = []
+
+    def keep(request: object, _: object) -> Result:
+        requests.append(request)
+        return Result()
+
+    monkeypatch.setattr(COMMANDS[name].request, "run", keep)
+    program, *words = shlex.split(line)
+    assert (program, words[0], run("", *words)[0], len(requests)) == ("semsig", name, 0, 1)
+    assert line in " ".join(run("", name, "--help")[1].splitlines()).replace("  ", "")
+
+
 WRITING = [
     name
     for name in RUN
     if any(field.suffixes and value_of(name, field) for field in COMMANDS[name].fields)
 ]
+
+
+@pytest.mark.usefixtures("city")
+@pytest.mark.parametrize("name", WRITING)
+def test_quiet_prints_only_the_paths_of_files(name: str, run: Run) -> None:
+    code, out, err = run("", *line_of(name), "--quiet")
+    assert (code, err) == (0, "")
+    assert [line for line in out.splitlines() if not Path(line).exists()] == []
 
 
 @pytest.mark.parametrize(

@@ -117,10 +117,10 @@ def test_extended_does_not_change_the_taxonomy() -> None:
     [
         (TAXONOMY.by_name, "street_ligth", ("'street_ligth'", "the nearest is 'street_light'")),
         *(
-            (TAXONOMY.by_symbol, symbol, (f"symbol {symbol!r} is unknown", "D street light"))
+            (TAXONOMY.by_symbol, symbol, (f"symbol {symbol!r} is unknown", "--symbols"))
             for symbol in ("", "DD", "Z", "é")
         ),
-        (TAXONOMY.encode, "DDZB", ("'Z'", "B alignment tree, D street light")),
+        (TAXONOMY.encode, "DDZB", ("'Z'", "`semsig info --symbols`")),
         (TAXONOMY.encode, "Dd", ("'d'", "the nearest is 'D'")),
         (TAXONOMY.by_code, 2, ("class code 2", "[1, 3]")),
     ],

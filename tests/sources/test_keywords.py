@@ -50,8 +50,8 @@ def test_names_of_the_taxonomy_have_priority() -> None:
         ("lampe", "the nearest is 'lamp'"),
         ("treehouse", "the nearest is 'Tree'"),
         ("fire hydrant", "'fire hydrant' is unknown"),
-        ("highway=crossing", "`semsig info`"),
-        ("", "`semsig sources`"),
+        ("highway=crossing", "`semsig info` lists the classes of a city"),
+        ("", "class '' is unknown"),
         ("b", "symbol 'b' is unknown; the nearest is 'B'"),
     ],
 )

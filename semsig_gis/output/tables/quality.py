@@ -155,7 +155,7 @@ def quality_sentence(report: QualityReport) -> str:
     more = f" and {rest:,} more class{'es' if rest > 1 else ''}" if rest else ""
     return (
         f"{_many(report.objects, 'street object')} of {_many(len(report.classes), 'class', 'es')} "
-        f"on {report.hull_km2:,.2g} km²: {names}{more}."
+        f"on {report.hull_km2:,.2f} km²: {names}{more}."
     )
 
 

@@ -209,7 +209,7 @@ def test_absent_class_is_not_used(tmp_path: Path, text: str) -> None:
         pd.testing.assert_frame_equal(result.candidates, expected.candidates)
         assert len(result.query) == 2
         (note,) = result.notes
-        assert note == "the map has no bus stop (M), so this object was not used."
+        assert note == "the map has no bus stop, so this object was not used."
     assert not expected.notes
 
 

@@ -49,10 +49,15 @@ def sections(evaluation: object) -> dict[str, Section]:
 @pytest.mark.parametrize(
     ("near", "chance", "top", "text"),
     [
-        (0.824, None, 1, "82 % of 60 queries were placed within 50 m (95 %: 71 to 90 %)."),
-        (0.083, None, 1, "8.3 % of 60 queries were placed within 50 m (95 %: 3.6 to 18 %)."),
-        (1.0, None, 5, "100 % of 60 queries were placed within 50 m by the best of 5 candidates "),
-        (0.5, 0.95, 1, "; the method was sure enough to answer 100 %, and 75 % of these answers "),
+        (0.824, None, 1, "Of 60 views, 82 % were placed within 50 m (95 %: 71 to 90 %)."),
+        (0.083, None, 1, "Of 60 views, 8.3 % were placed within 50 m (95 %: 3.6 to 18 %)."),
+        (1.0, None, 5, "Of 60 views, 100 % were placed within 50 m by the best of 5 candidates "),
+        (
+            0.5,
+            0.95,
+            1,
+            "; the method answers 100 % of them, and when it answers, it is right in 75 %.",
+        ),
         (0.5, 0.1, 1, "; the method was not sure enough to answer any of them."),
     ],
 )

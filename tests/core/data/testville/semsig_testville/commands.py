@@ -5,7 +5,7 @@ from typing import Annotated
 from semsig_gis.commands import Option, Reporter, Result, command
 
 
-@command("count-benches", title="Count benches", group="Results", order=50, returns=int)
+@command("count-benches", title="Count benches", group="Look", order=50, returns=int)
 @dataclass(frozen=True, kw_only=True)
 class CountBenches:
     """Count the benches of Testville."""
