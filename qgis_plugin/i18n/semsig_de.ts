@@ -156,16 +156,24 @@
         <translation>Gebäudegrundrisse, die verdecken, was hinter ihnen liegt.</translation>
     </message>
     <message>
-        <source>Building footprints to write as well (.parquet).</source>
-        <translation>Gebäudegrundrisse, die auch geschrieben werden (.parquet).</translation>
+        <source>Building footprints to write (.parquet).</source>
+        <translation>Gebäudegrundrisse, die geschrieben werden (.parquet).</translation>
     </message>
     <message>
         <source>Buildings</source>
         <translation>Gebäude</translation>
     </message>
     <message>
+        <source>Buildings and streets</source>
+        <translation>Gebäude und Straßen</translation>
+    </message>
+    <message>
+        <source>Buildings and streets of the street objects</source>
+        <translation>Gebäude und Straßen der Straßenobjekte</translation>
+    </message>
+    <message>
         <source>By likelihood, every place gets a chance. A method by distance takes only what was seen and --require of what is known, and cannot explain.</source>
-        <translation>Nach Likelihood bekommt jeder Ort eine Wahrscheinlichkeit. Eine Methode nach Abstand nimmt nur, was gesehen wurde, und von dem, was bekannt ist, --require; sie kann nicht erklären.</translation>
+        <translation>Mit der Methode likelihood bekommt jeder Ort eine Wahrscheinlichkeit. Eine Methode nach Abstand nutzt nur, was zu sehen war, und vom Bekannten --require, und kann nichts erklären.</translation>
     </message>
     <message>
         <source>CRS in metres to work in.</source>
@@ -244,16 +252,16 @@
         <translation>Zellen</translation>
     </message>
     <message>
-        <source>Centre lines of streets to write as well (.parquet).</source>
-        <translation>Mittellinien von Straßen, die auch geschrieben werden (.parquet).</translation>
+        <source>Centre lines of streets to write (.parquet).</source>
+        <translation>Mittellinien von Straßen, die geschrieben werden (.parquet).</translation>
+    </message>
+    <message>
+        <source>Centre lines of streets, for maps, names of places and viewpoints near streets.</source>
+        <translation>Mittellinien von Straßen, für Karten, Namen von Orten und Standpunkte an Straßen.</translation>
     </message>
     <message>
         <source>Centre lines to draw below the map.</source>
         <translation>Mittellinien, die unter die Karte gezeichnet werden.</translation>
-    </message>
-    <message>
-        <source>Centre lines, for viewpoints near streets.</source>
-        <translation>Mittellinien, für Standpunkte an Straßen.</translation>
     </message>
     <message>
         <source>Chance</source>
@@ -744,8 +752,8 @@
         <translation>Die Engine von Semantische Signaturen wird installiert</translation>
     </message>
     <message>
-        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the area that OpenStreetMap files state.</source>
-        <translation>Nur behalten, was in diesem Rechteck in Grad, in den Polygonen einer Datei oder mit 'box' in dem Gebiet liegt, das Dateien von OpenStreetMap angeben.</translation>
+        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the box that OpenStreetMap files state; with 'none' keep all.</source>
+        <translation>Nur behalten, was in diesem Rechteck in Grad, in den Polygonen einer Datei oder mit 'box' in dem Rechteck liegt, das Dateien von OpenStreetMap angeben; mit 'none' alles behalten.</translation>
     </message>
     <message>
         <source>Keep the cells in this box in degrees, or in polygons.</source>
@@ -780,8 +788,8 @@
         <translation>Letzter bekannter Ort, in Grad oder als X,Y,SIGMA im KBS der Datenbank, SIGMA in Metern.</translation>
     </message>
     <message>
-        <source>Layer to write, by default cells, in a .gpkg all: cells, evaluation, evaluation_lines, hexagons, objects (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
-        <translation>Layer, der geschrieben wird, ohne Angabe cells, in einem .gpkg alle: cells, evaluation, evaluation_lines, hexagons, objects (mehrere sind möglich). In einem .tif, ohne Angabe ambiguity: ambiguity, error, field, identifiability.</translation>
+        <source>Layer to write, by default cells, in a .gpkg all: buildings, cells, evaluation, evaluation_lines, hexagons, objects, streets (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
+        <translation>Layer, der geschrieben wird, ohne Angabe cells, in einem .gpkg alle: buildings, cells, evaluation, evaluation_lines, hexagons, objects, streets (mehrere sind möglich). In einem .tif, ohne Angabe ambiguity: ambiguity, error, field, identifiability.</translation>
     </message>
     <message>
         <source>Layers</source>
@@ -1261,7 +1269,7 @@
     </message>
     <message>
         <source>Run every step on a small made-up town, offline.</source>
-        <translation>Führt jeden Schritt mit einer kleinen erfundenen Stadt aus, ohne Netz.</translation>
+        <translation>Führt jeden Schritt mit einem kleinen erfundenen Ort aus, ohne Netz.</translation>
     </message>
     <message>
         <source>Run the evaluations of an experiment, or resume them.</source>
@@ -1309,7 +1317,7 @@
     </message>
     <message>
         <source>Seed of the town and the queries.</source>
-        <translation>Startwert der Stadt und der Anfragen.</translation>
+        <translation>Startwert des Ortes und der Anfragen.</translation>
     </message>
     <message>
         <source>Seen from here</source>
@@ -1588,6 +1596,10 @@
         <translation>Höchstens so viele Ansichten je Teil verwenden.</translation>
     </message>
     <message>
+        <source>Use the buildings and streets that `semsig load` wrote next to the street objects.</source>
+        <translation>Die Gebäude und Straßen nutzen, die `semsig load` neben die Straßenobjekte geschrieben hat.</translation>
+    </message>
+    <message>
         <source>Use the cache only.</source>
         <translation>Nur den Zwischenspeicher verwenden.</translation>
     </message>
@@ -1600,8 +1612,8 @@
         <translation>Standpunkte</translation>
     </message>
     <message>
-        <source>Viewpoints: every cell, outdoor cells or cells near streets (needs --streets).</source>
-        <translation>Standpunkte: alle Zellen (all), Zellen außerhalb der Gebäude (outdoor) oder Zellen an Straßen (streets, braucht --streets).</translation>
+        <source>Viewpoints: every cell, outdoor cells or cells near streets.</source>
+        <translation>Standpunkte: alle Zellen (all), Zellen außerhalb der Gebäude (outdoor) oder Zellen an Straßen (streets).</translation>
     </message>
     <message>
         <source>Views</source>
@@ -1668,6 +1680,10 @@
         <translation>Sechsecke dieser Auflösung von H3 schreiben, etwa 9, die Zellen, Objekte und Anfragen zusammenfassen.</translation>
     </message>
     <message>
+        <source>Write the buildings and streets of the source as well, next to --out.</source>
+        <translation>Auch die Gebäude und Straßen der Quelle schreiben, neben --out.</translation>
+    </message>
+    <message>
         <source>Years between the old objects and the new ones, for the report of --json.</source>
         <translation>Jahre zwischen den alten und den neuen Objekten, für den Bericht von --json.</translation>
     </message>
@@ -1694,6 +1710,10 @@
     <message>
         <source>as many cells as Paris</source>
         <translation>so viele Zellen wie Paris</translation>
+    </message>
+    <message>
+        <source>box where a file states one</source>
+        <translation>box, wo eine Datei eines angibt</translation>
     </message>
     <message>
         <source>by-hand for a view in words, photo for a view of sectors, panorama for a full turn with scores, otherwise generic</source>
@@ -1756,6 +1776,14 @@
         <translation>Name</translation>
     </message>
     <message>
+        <source>next to the street objects, if there are any</source>
+        <translation>neben den Straßenobjekten, falls es welche gibt</translation>
+    </message>
+    <message>
+        <source>outdoor where there are buildings, otherwise all</source>
+        <translation>outdoor, wo es Gebäude gibt, sonst all</translation>
+    </message>
+    <message>
         <source>over 99 %</source>
         <translation>über 99 %</translation>
     </message>
@@ -1794,6 +1822,14 @@
     <message>
         <source>the folder of the files, or the one of images next to it</source>
         <translation>der Ordner der Dateien oder der Ordner images daneben</translation>
+    </message>
+    <message>
+        <source>the name of --out with .buildings</source>
+        <translation>der Name von --out mit .buildings</translation>
+    </message>
+    <message>
+        <source>the name of --out with .streets</source>
+        <translation>der Name von --out mit .streets</translation>
     </message>
     <message>
         <source>the name of the database's file</source>

@@ -109,7 +109,7 @@
     </message>
     <message>
         <source>Ask</source>
-        <translation>Demander</translation>
+        <translation>Interroger</translation>
     </message>
     <message>
         <source>Assume that views are from the area of the database. Otherwise the chance that they are from elsewhere is 50 % before their objects are compared.</source>
@@ -156,16 +156,24 @@
         <translation>Emprises de bâtiments qui cachent ce qui est derrière elles.</translation>
     </message>
     <message>
-        <source>Building footprints to write as well (.parquet).</source>
-        <translation>Emprises de bâtiments à écrire aussi (.parquet).</translation>
+        <source>Building footprints to write (.parquet).</source>
+        <translation>Emprises de bâtiments à écrire (.parquet).</translation>
     </message>
     <message>
         <source>Buildings</source>
         <translation>Bâtiments</translation>
     </message>
     <message>
+        <source>Buildings and streets</source>
+        <translation>Bâtiments et rues</translation>
+    </message>
+    <message>
+        <source>Buildings and streets of the street objects</source>
+        <translation>Bâtiments et rues des objets de rue</translation>
+    </message>
+    <message>
         <source>By likelihood, every place gets a chance. A method by distance takes only what was seen and --require of what is known, and cannot explain.</source>
-        <translation>Par vraisemblance, chaque lieu reçoit une probabilité. Une méthode par distance ne prend que ce qui a été vu et, de ce qui est connu, --require ; elle ne peut pas expliquer.</translation>
+        <translation>Avec la méthode likelihood, chaque lieu reçoit une probabilité. Une méthode par distance n’utilise que ce qui a été vu et, de ce qui est connu, --require, et ne peut rien expliquer.</translation>
     </message>
     <message>
         <source>CRS in metres to work in.</source>
@@ -244,16 +252,16 @@
         <translation>Cellules</translation>
     </message>
     <message>
-        <source>Centre lines of streets to write as well (.parquet).</source>
-        <translation>Axes de rues à écrire aussi (.parquet).</translation>
+        <source>Centre lines of streets to write (.parquet).</source>
+        <translation>Axes de rues à écrire (.parquet).</translation>
+    </message>
+    <message>
+        <source>Centre lines of streets, for maps, names of places and viewpoints near streets.</source>
+        <translation>Axes de rues, pour les cartes, les noms des lieux et les points de vue près des rues.</translation>
     </message>
     <message>
         <source>Centre lines to draw below the map.</source>
         <translation>Axes à dessiner sous la carte.</translation>
-    </message>
-    <message>
-        <source>Centre lines, for viewpoints near streets.</source>
-        <translation>Axes, pour les points de vue près des rues.</translation>
     </message>
     <message>
         <source>Chance</source>
@@ -744,8 +752,8 @@
         <translation>Installation du moteur de Signatures sémantiques</translation>
     </message>
     <message>
-        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the area that OpenStreetMap files state.</source>
-        <translation>Ne garder que ce qui est dans cette emprise en degrés, dans les polygones d’un fichier, ou avec 'box' dans la zone que les fichiers OpenStreetMap indiquent.</translation>
+        <source>Keep only what is in this box in degrees, in the polygons of a file, or with 'box' in the box that OpenStreetMap files state; with 'none' keep all.</source>
+        <translation>Ne garder que ce qui est dans cette emprise en degrés, dans les polygones d’un fichier, ou avec 'box' dans l’emprise que les fichiers OpenStreetMap indiquent ; avec 'none', tout garder.</translation>
     </message>
     <message>
         <source>Keep the cells in this box in degrees, or in polygons.</source>
@@ -780,8 +788,8 @@
         <translation>Dernier lieu connu, en degrés ou sous la forme X,Y,SIGMA dans le SCR de la base, SIGMA en mètres.</translation>
     </message>
     <message>
-        <source>Layer to write, by default cells, in a .gpkg all: cells, evaluation, evaluation_lines, hexagons, objects (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
-        <translation>Couche à écrire, par défaut cells, dans un .gpkg toutes : cells, evaluation, evaluation_lines, hexagons, objects (plusieurs sont possibles). Dans un .tif, par défaut ambiguity : ambiguity, error, field, identifiability.</translation>
+        <source>Layer to write, by default cells, in a .gpkg all: buildings, cells, evaluation, evaluation_lines, hexagons, objects, streets (repeat for several). In a .tif, by default ambiguity: ambiguity, error, field, identifiability.</source>
+        <translation>Couche à écrire, par défaut cells, dans un .gpkg toutes : buildings, cells, evaluation, evaluation_lines, hexagons, objects, streets (plusieurs sont possibles). Dans un .tif, par défaut ambiguity : ambiguity, error, field, identifiability.</translation>
     </message>
     <message>
         <source>Layers</source>
@@ -1261,7 +1269,7 @@
     </message>
     <message>
         <source>Run every step on a small made-up town, offline.</source>
-        <translation>Exécute chaque étape sur une petite ville inventée, sans réseau.</translation>
+        <translation>Exécute chaque étape sur un petit bourg inventé, sans réseau.</translation>
     </message>
     <message>
         <source>Run the evaluations of an experiment, or resume them.</source>
@@ -1309,7 +1317,7 @@
     </message>
     <message>
         <source>Seed of the town and the queries.</source>
-        <translation>Graine de la ville et des requêtes.</translation>
+        <translation>Graine du bourg et des requêtes.</translation>
     </message>
     <message>
         <source>Seen from here</source>
@@ -1588,6 +1596,10 @@
         <translation>Utiliser au plus ce nombre de vues par ensemble.</translation>
     </message>
     <message>
+        <source>Use the buildings and streets that `semsig load` wrote next to the street objects.</source>
+        <translation>Utiliser les bâtiments et les rues que `semsig load` a écrits à côté des objets de rue.</translation>
+    </message>
+    <message>
         <source>Use the cache only.</source>
         <translation>N’utiliser que le cache.</translation>
     </message>
@@ -1600,8 +1612,8 @@
         <translation>Points de vue</translation>
     </message>
     <message>
-        <source>Viewpoints: every cell, outdoor cells or cells near streets (needs --streets).</source>
-        <translation>Points de vue : chaque cellule (all), les cellules en extérieur (outdoor) ou les cellules près des rues (streets, avec --streets).</translation>
+        <source>Viewpoints: every cell, outdoor cells or cells near streets.</source>
+        <translation>Points de vue : chaque cellule (all), les cellules en extérieur (outdoor) ou les cellules près des rues (streets).</translation>
     </message>
     <message>
         <source>Views</source>
@@ -1668,6 +1680,10 @@
         <translation>Écrire des hexagones de cette résolution de H3, comme 9, qui résument cellules, objets et requêtes.</translation>
     </message>
     <message>
+        <source>Write the buildings and streets of the source as well, next to --out.</source>
+        <translation>Écrire aussi les bâtiments et les rues de la source, à côté de --out.</translation>
+    </message>
+    <message>
         <source>Years between the old objects and the new ones, for the report of --json.</source>
         <translation>Années entre les anciens objets et les nouveaux, pour le rapport de --json.</translation>
     </message>
@@ -1694,6 +1710,10 @@
     <message>
         <source>as many cells as Paris</source>
         <translation>autant de cellules que Paris</translation>
+    </message>
+    <message>
+        <source>box where a file states one</source>
+        <translation>box, là où un fichier en indique une</translation>
     </message>
     <message>
         <source>by-hand for a view in words, photo for a view of sectors, panorama for a full turn with scores, otherwise generic</source>
@@ -1756,6 +1776,14 @@
         <translation>nom</translation>
     </message>
     <message>
+        <source>next to the street objects, if there are any</source>
+        <translation>à côté des objets de rue, s’il y en a</translation>
+    </message>
+    <message>
+        <source>outdoor where there are buildings, otherwise all</source>
+        <translation>outdoor là où il y a des bâtiments, sinon all</translation>
+    </message>
+    <message>
         <source>over 99 %</source>
         <translation>plus de 99 %</translation>
     </message>
@@ -1794,6 +1822,14 @@
     <message>
         <source>the folder of the files, or the one of images next to it</source>
         <translation>le dossier des fichiers, ou celui des images à côté</translation>
+    </message>
+    <message>
+        <source>the name of --out with .buildings</source>
+        <translation>le nom de --out avec .buildings</translation>
+    </message>
+    <message>
+        <source>the name of --out with .streets</source>
+        <translation>le nom de --out avec .streets</translation>
     </message>
     <message>
         <source>the name of the database's file</source>
