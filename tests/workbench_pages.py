@@ -11,6 +11,7 @@ from machine import PATIENCE_S
 from map_pages import BrowserPage, requested
 from selenium.common.exceptions import TimeoutException
 from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
 if TYPE_CHECKING:
@@ -67,6 +68,17 @@ class WorkbenchPage(BrowserPage):
         ActionChains(self.browser).send_keys(*keys).perform()
         return self.settle()
 
+    def chord(self, *keys: str) -> str:
+        """Press the last key while the others are held."""
+        chain = ActionChains(self.browser)
+        for key in keys[:-1]:
+            chain.key_down(key)
+        chain.send_keys(keys[-1])
+        for key in keys[:-1]:
+            chain.key_up(key)
+        chain.perform()
+        return self.settle()
+
     def give(self, selector: str, *files: Path) -> str:
         """Choose files in a file input; return the sentence of the answer."""
         self.one(selector).send_keys("\n".join(map(str, files)))
@@ -112,12 +124,20 @@ class WorkbenchPage(BrowserPage):
         chain.release().perform()
 
     def mark(self, photo: StreetPhoto, number: int) -> str:
-        """Draw the box of an object of a photo, then press the key of its class."""
+        """Draw the box of an object of a photo, then type its class into the menu."""
         stage = self.one(STAGE).size
         wide, high = photo.size(number)
         size = max(round(wide * stage["width"]), 9), max(round(high * stage["height"]), 9)
         self.pull(STAGE, photo.corner(number), size)
-        return self.type(photo.things[number][0])
+        title = (
+            "return semsig.session.city.classes.find((item) => item.symbol === arguments[0]).title"
+        )
+        return self.type(str(self.ask(title, photo.things[number][0])), Keys.ENTER)
+
+    def brush(self, name: str) -> None:
+        """Choose the class of the next marks; an empty one asks at each."""
+        self.ask("document.getElementById('several').open = true")
+        self.press(f"#palette [data-name='{name}']")
 
     def until(self, script: str, *arguments: object) -> Any:  # noqa: ANN401
         """Wait until a script returns a true value, and return it."""

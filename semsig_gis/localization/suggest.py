@@ -34,7 +34,7 @@ LOOKED_FOR = 0.95
 EDGE = 5.0
 """Degrees at each edge of a photo in which objects do not count: its heading is only estimated."""
 MOST_CELLS = 20_000
-"""Likeliest cells whose part in the sectors of a view is compared."""
+"""Most cells, the likeliest ones, in which the sectors of a view are compared."""
 
 QuestionRecord = TypedDict(
     "QuestionRecord",

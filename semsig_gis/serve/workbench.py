@@ -23,6 +23,7 @@ from semsig_gis.core import (
     UnknownNameError,
     class_signs,
     nearest_name,
+    place_links,
     read_table,
     wrap_degrees,
 )
@@ -40,6 +41,7 @@ from semsig_gis.localization import (
     with_unplaced,
 )
 from semsig_gis.observation import (
+    POSSIBLE_FOV,
     LabelMap,
     North,
     Photo,
@@ -166,14 +168,14 @@ class Workbench:
         """The facts about the city that the page shows first."""
         database = self.database
         image, bounds = city_image(database)
-        shares = self._shares
+        shares, seen = self._shares, database.occurrences
         signs = class_signs(database.taxonomy)
         ranges = database.taxonomy.ranges(database.spec.radius)
-        # A class that half of the cells see is the most informative, seen or not.
+        # The classes that are seen most often come first.
         present = set(database.present_codes.tolist())
         kinds = sorted(
             (item for item in self.taxonomy.classes if item.code in present),
-            key=lambda item: abs(shares[item.code] - 0.5),
+            key=lambda item: -int(seen[item.code]),
         )
         return {
             "name": self.city.path.stem,
@@ -185,6 +187,10 @@ class Workbench:
             "method": "likelihood",
             "noise": list(self.noises),
             "licences": list(map(str, database.licenses)),
+            # Without the layers, which the page lists apart.
+            "credit": ", ".join(
+                dict.fromkeys(line.partition(": ")[0] for line in database.licenses)
+            ),
             "bounds": corners_of(database).tolist(),
             "image": {"url": data_url(image), "bounds": bounds},
             "classes": [
@@ -198,6 +204,7 @@ class Workbench:
                     "drop": signs[item.code].drop,
                     "shape": signs[item.code].shape,
                     "outline": OUTLINES[signs[item.code].shape],
+                    "pictogram": signs[item.code].pictogram,
                     "range": float(ranges[item.code]),
                     "share": float(shares[item.code]),
                 }
@@ -208,6 +215,7 @@ class Workbench:
                 verdict: {"colour": VERDICTS[verdict], "text": text, **look}
                 for verdict, (text, look) in RAYS.items()
             },
+            "fovs": [min(POSSIBLE_FOV), max(POSSIBLE_FOV)],
             "max_zoom": MAX_ZOOM,
             "max_upload": MOST_UPLOAD,
             "has_objects": self.store is not None,
@@ -329,6 +337,10 @@ class Workbench:
             rays = candidate["rays"]
             for ray in rays:
                 ray["mark"] = None if ray["query"] is None else list(marks[ray["query"]])
+            candidate["place_name"] = location.place_name and location.place_name(
+                candidate["x"], candidate["y"]
+            )
+            candidate["links"] = place_links(*candidate["place"])
             candidate["for_against"] = place_reasons(rays, codes, table=table, shares=self._shares)
         command = question.command(
             self.taxonomy,
@@ -338,6 +350,7 @@ class Workbench:
             objects=self.objects,
         )
         return drawing | {
+            "place_name": location.place,
             "region": self._region(location),
             "truth": None if question.truth is None else self._truth(location, question.truth),
             "command": command,

@@ -78,7 +78,7 @@ MOST_PLACES = 100
 ROUNDING = 1e-9
 TINY = np.finfo(np.float64).tiny
 LEAST_REFINED = 0.02
-"""Least chance of a version of a query whose place is searched between the viewpoints."""
+"""Least chance of a version of a query for a search between the viewpoints."""
 
 
 class _Version(NamedTuple):
@@ -402,7 +402,7 @@ class LikelihoodLocator:
         scanned: Sequence[CellScores] | None = None,
         top: int | None = None,
     ) -> tuple[Location, ...]:
-        """Locate a view, or the views of a route, of which exactly one version is right.
+        """Locate a view, or the views of a route, from versions: exactly one is right.
 
         Before they are compared, all versions have the same chance. `log_weights` are added to the
         log-likelihood of each view, for densities that are not per degree. The `scores` of the
@@ -747,7 +747,7 @@ def locate_versions(
     log_weights: Sequence[float] | None = None,
     **options: Unpack[LocateOptions],
 ) -> Location:
-    """Locate a query of which exactly one of several versions is right.
+    """Locate a query from several versions: exactly one is right.
 
     A photo of unknown field of view, for example, has a version for each field of view that it may
     have. The chances of places are the sums over the versions.

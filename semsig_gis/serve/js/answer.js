@@ -11,10 +11,10 @@ semsig.sentence = ({answer, scenes}) => {
   if (!scenes.length) return "Nothing was seen yet: add a photo, a compass, or simulate a view.";
   if (answer?.error) return answer.error;
   if (!answer?.estimate) return "Nothing is marked yet: click what you see.";
-  const {given, mass, radius, estimate, region, doubt} = answer;
+  const {given, mass, radius, estimate, region, doubt, place_name: name} = answer;
+  const where = semsig.coordinates(estimate.place) + (name ? ` (${name})` : "");
   const verdict = given
-    ? `Within ${radius} m of ${semsig.coordinates(estimate.place)} with a chance of `
-      + `${semsig.percent(mass)}.`
+    ? `Within ${radius} m of ${where} with a chance of ${semsig.percent(mass)}.`
     : `Cannot tell yet. ${region.text}; within ${radius} m of the best the chance is `
       + `${semsig.percent(mass)}.`;
   const text = doubt ? `${verdict} ${doubt}` : verdict;
@@ -36,6 +36,9 @@ semsig.Answer = class {
     const box = document.getElementById("answer");
     box.className = !shown ? "" : shown.given ? "given" : "open";
     document.getElementById("sentence").textContent = semsig.sentence(session);
+    document.getElementById("refining").hidden = !shown?.quick;
+    const fov = document.getElementById("likeliest-fov");
+    if (fov) fov.textContent = shown?.fov ? `Likeliest here: ${shown.fov}\u00b0.` : "";
     document.getElementById("notes").textContent = (shown?.notes || []).join(" ");
     this.showRegions(shown);
     this.choose(0);
@@ -119,6 +122,7 @@ semsig.Answer = class {
       html.append(semsig.sign(item));
       L.marker(ray.to, {
         icon: L.divIcon({html, className: "", iconSize: [22, 22]}), keyboard: false,
+        zIndexOffset: chosen ? 2000 : 0,
       }).bindTooltip(`${ray.title}: ${text}`).addTo(drawn)
         .on("click", () => { if (mark) session.show(scene, mark); });
     }
@@ -164,9 +168,24 @@ semsig.Answer = class {
       return button;
     }));
   }
+  // Where the candidate is, and links to see it elsewhere.
+  showSpot() {
+    const line = document.getElementById("spot");
+    const {candidate} = this;
+    line.replaceChildren();
+    if (!candidate) return;
+    const {rank, place, place_name: name, links} = candidate;
+    line.append([`Candidate ${rank}: ${semsig.coordinates(place)}`, name].filter(Boolean).join(", "));
+    for (const [title, href] of Object.entries(links)) {
+      line.append(" · ");
+      const link = L.DomUtil.create("a", "", line);
+      Object.assign(link, {href, target: "_blank", rel: "noopener noreferrer", textContent: title});
+    }
+  }
   showReasons() {
     const box = document.getElementById("speaks");
     const reasons = this.candidate?.for_against || [];
+    this.showSpot();
     box.replaceChildren();
     for (const [title, sign] of [["for", 1], ["against", -1]]) {
       const counts = new Map();

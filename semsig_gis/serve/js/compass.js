@@ -1,7 +1,7 @@
 // A view composed by hand: objects with their direction and rough distance.
 semsig.compass = (session, view) => {
   const {reach} = session.city;
-  const stage = L.DomUtil.create("div", "stage compass");
+  const stage = L.DomUtil.create("div", "stage sheet compass");
   const drawing = L.SVG.create("svg");
   drawing.setAttribute("viewBox", "-120 -120 240 240");
   drawing.setAttribute("aria-hidden", "true");
@@ -13,13 +13,13 @@ semsig.compass = (session, view) => {
     return [out * Math.sin(angle), -out * Math.cos(angle)];
   };
   const outOf = ({range}) => (
-    range === null ? rim + 8 : 10 + (rim - 14) * semsig.ranged(session, range, 0) / reach);
+    range === null ? rim + 8 : (rim - 8) * semsig.ranged(session, range, 0) / reach);
   for (const [from, to] of view.sectors || []) {
     const [[x, y], [endX, endY]] = [turned(from, rim), turned(to, rim)];
     const large = (to - from + 360) % 360 > 180 ? 1 : 0;
     draw("path", {d: `M0,0L${x},${y}A${rim},${rim} 0 ${large} 1 ${endX},${endY}Z`, class: "looked"});
   }
-  for (const share of [1 / 3, 2 / 3]) draw("circle", {r: 10 + (rim - 14) * share, class: "third"});
+  for (const share of [1 / 3, 2 / 3, 1]) draw("circle", {r: (rim - 8) * share, class: "third"});
   draw("circle", {r: rim, class: "ring"});
   draw("circle", {r: 2, class: "north"});
   const unknown = view.heading_error !== null;
@@ -38,7 +38,7 @@ semsig.compass = (session, view) => {
     const x = (event.clientX - edge.left) / edge.width * 240 - 120;
     const y = (event.clientY - edge.top) / edge.height * 240 - 120;
     const out = Math.hypot(x, y);
-    const range = Math.min(Math.max((out - 10) / (rim - 14), 1 / reach), 1) * reach;
+    const range = Math.min(Math.max(out / (rim - 8), 1 / reach), 1) * reach;
     return {
       bearing: Math.round((Math.atan2(x, -y) * 180 / Math.PI + 360) % 360) % 360,
       range: out > rim ? null : Math.round(range),
@@ -46,14 +46,14 @@ semsig.compass = (session, view) => {
   };
   for (const entry of view.compass) {
     const button = semsig.mark(session, entry, {
-      drag: (_from, _right, _down, event) => {
+      drag: (from, _right, _down, event) => {
         Object.assign(entry, read(event));
-        session.changed();
+        session.changed(from);
       },
       nudge: (right, up) => {
         if (right) entry.bearing = (entry.bearing + 5 * right + 360) % 360;
         else entry.range = semsig.ranged(session, entry.range, up);
-        session.changed();
+        session.changed(`nudge ${view.compass.indexOf(entry)}`);
       },
     });
     const [x, y] = turned(entry.bearing, outOf(entry));
@@ -65,7 +65,7 @@ semsig.compass = (session, view) => {
   stage.addEventListener("pointerdown", (event) => {
     if (event.button || !event.isPrimary) return;
     event.preventDefault();
-    semsig.addMark(session, read(event));
+    semsig.addMark(session, read(event), event);
   });
   return stage;
 };

@@ -21,15 +21,48 @@ semsig.api = async (path, body, signal) => {
 semsig.Session = class extends EventTarget {
   constructor(city) {
     super();
-    Object.assign(this, {city, noise: null, seenFrom: "anywhere", brush: "?", asking: false,
-      page: crypto.randomUUID(), closer: null});
+    Object.assign(this, {city, noise: null, seenFrom: "anywhere", brush: null, asking: false,
+      page: crypto.randomUUID(), closer: null, past: [], future: [], gesture: null});
     this.clear();
+    this.present = this.savedPresent = this.state();
+  }
+  // What undo and redo restore, as text.
+  state() {
+    const {views, truth, absent, unsure, near} = this;
+    return JSON.stringify({views, truth, absent, unsure, near});
+  }
+  // Whether marks or answers would be lost with the page.
+  get unsaved() {
+    const some = this.scenes.some((scene) => (scene.marks || scene.compass).length);
+    return some && !this.truth && this.present !== this.savedPresent;
+  }
+  // Remembers the state before a change; the changes of one gesture are one step.
+  remember(gesture) {
+    const now = this.state();
+    if (now === this.present) return;
+    if (gesture === null || gesture !== this.gesture) this.past.push(this.present);
+    Object.assign(this, {present: now, future: [], gesture});
+  }
+  undo() {
+    this.goBack(this.past, this.future);
+  }
+  redo() {
+    this.goBack(this.future, this.past);
+  }
+  goBack(from, to) {
+    if (!from.length) return;
+    const at = this.scenes.indexOf(this.scene);
+    to.push(this.present);
+    this.present = from.pop();
+    Object.assign(this, JSON.parse(this.present), {gesture: null});
+    this.show(this.scenes[at] ?? this.scenes.at(-1) ?? null);
+    this.changed();
   }
   // A view is from one place and has photos or a compass; a scene is a photo or a compass.
   clear() {
     Object.assign(this, {
       views: [], scene: null, mark: null, answer: null, truth: null, chosen: 0, changedAt: 0,
-      absent: [], near: null});
+      absent: [], unsure: [], near: null});
   }
   get scenes() {
     return this.views.flatMap((view) => view.photos || [view]);
@@ -73,7 +106,8 @@ semsig.Session = class extends EventTarget {
   notify(what) {
     this.dispatchEvent(new Event(what));
   }
-  changed() {
+  changed(gesture = null) {
+    this.remember(gesture);
     this.notify("change");
     this.askAgain();
   }
@@ -150,5 +184,6 @@ semsig.Session = class extends EventTarget {
       absent: saved.absent || [], near: saved.near ?? null});
     this.show(this.scenes[0] ?? null);
     this.changed();
+    this.savedPresent = this.present;
   }
 };

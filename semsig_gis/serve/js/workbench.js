@@ -21,13 +21,6 @@ semsig.trying = (call) => async (...values) => {
   }
   document.body.removeAttribute("aria-busy");
 };
-semsig.rename = (session, name) => {
-  session.brush = name;
-  if (session.mark) {
-    session.mark.class = name;
-    session.changed();
-  } else session.notify("change");
-};
 semsig.button = (parent, text, call, label) => {
   const button = L.DomUtil.create("button", "", parent);
   Object.assign(button, {type: "button", textContent: text});
@@ -35,28 +28,25 @@ semsig.button = (parent, text, call, label) => {
   button.addEventListener("click", call);
   return button;
 };
-// The classes of the city, the most informative first.
+// A class for the next marks, instead of a menu at each.
 semsig.palette = (session) => {
   const box = semsig.element("palette");
-  const seen = session.city.classes.filter(({share}) => share > 0);
-  box.replaceChildren(...[...seen, semsig.unnamed].map((item) => {
+  const ask = {name: "", title: "Ask at each mark"};
+  box.replaceChildren(...[ask, ...semsig.kinds(session)].map((item) => {
     const button = L.DomUtil.create("button", "class");
     button.type = "button";
-    button.append(semsig.sign(item));
+    if (item.name) button.append(semsig.sign(item));
     semsig.text(button, "span", item.title);
-    button.setAttribute("aria-keyshortcuts", item.symbol);
-    button.title = `Key ${item.symbol}`;
     button.dataset.name = item.name;
-    // Sets the class of the next mark, and of the current mark if it has none.
     button.addEventListener("click", () => {
-      if (session.mark?.class !== "?") session.mark = null;
-      semsig.rename(session, item.name);
+      session.brush = item.name || null;
+      session.notify("change");
     });
     return button;
   }));
   const chosen = () => {
     for (const button of box.children) {
-      button.setAttribute("aria-pressed", String(button.dataset.name === session.brush));
+      button.setAttribute("aria-pressed", String(button.dataset.name === (session.brush ?? "")));
     }
   };
   session.addEventListener("change", chosen);
@@ -73,7 +63,11 @@ semsig.showScenes = (session) => {
       const tab = semsig.button(group, name, () => session.show(scene));
       tab.className = "tab";
       tab.setAttribute("aria-pressed", String(scene === session.scene));
-      semsig.button(group, "\u00d7", () => session.remove(scene), `Remove ${name}`);
+      semsig.button(group, "\u00d7", () => {
+        const count = (scene.marks || scene.compass).length;
+        if (!count || session.truth || window.confirm(
+          `Remove ${name} with its ${count} mark${count === 1 ? "" : "s"}?`)) session.remove(scene);
+      }, `Remove ${name}`);
     }
   });
   const chooser = (id, text, call) => {
@@ -129,10 +123,13 @@ semsig.showScene = (session) => {
   if (!scene) return;
   const focused = document.activeElement;
   const again = focused === document.body || focused.matches("#picture .mark");
+  const own = focused.matches("#picture .stage") ? ".stage" : focused.closest("#picture .tools")
+    ? `.${focused.className}` : null;
   semsig.element("picture").replaceChildren(
     (scene.marks ? semsig.photo : semsig.compass)(session, scene));
   const mark = document.querySelector("#picture .mark[aria-pressed=true]");
-  if (again && mark) mark.focus({preventScroll: true});
+  if (own) document.querySelector(`#picture ${own}`)?.focus({preventScroll: true});
+  else if (again && mark) mark.focus({preventScroll: true});
   semsig.showMarks(session);
   semsig.showEditor(session);
 };
@@ -164,9 +161,11 @@ semsig.showEditor = (session) => {
     semsig.text(line, "span", text);
     return line;
   };
-  const titles = [...session.city.classes, semsig.unnamed].map((item) => [item.name, item.title]);
-  semsig.select(label("It is"), Object.fromEntries(titles), mark.class,
-    (value) => semsig.rename(session, value)).id = "class";
+  const titles = semsig.kinds(session).map((item) => [item.name, item.title]);
+  semsig.select(label("It is"), Object.fromEntries(titles), mark.class, (value) => {
+    mark.class = value;
+    session.changed();
+  }).id = "class";
   const choices = {
     "": mark.box ? "from its box" : "unknown", near: `near, up to ${Math.round(reach / 3)} m`,
     middle: "midway", far: `far, up to ${Math.round(reach)} m`};
@@ -214,17 +213,20 @@ semsig.suggest = (session) => {
     line.replaceChildren();
     // An absent class is about the place of the first view.
     const first = session.scene && session.viewOf(session.scene) === session.views[0];
-    const setAbsent = (absent) => {
-      session.absent = absent;
+    const set = (values) => {
+      Object.assign(session, values);
       session.changed();
     };
     const listed = L.DomUtil.create("span", "absent", line);
-    for (const name of session.absent) {
-      const {title} = session.city.classes.find((item) => item.name === name);
-      semsig.button(listed, `No ${title.toLowerCase()} \u00d7`,
-        () => setAbsent(session.absent.filter((other) => other !== name)),
-        `Forget that no ${title.toLowerCase()} is there`);
-    }
+    const list = (key, textOf, meaning) => {
+      for (const name of session[key]) {
+        const title = semsig.classNamed(session, name).title.toLowerCase();
+        semsig.button(listed, `${textOf(title)} \u00d7`,
+          () => set({[key]: session[key].filter((other) => other !== name)}), meaning(title));
+      }
+    };
+    list("absent", (title) => `No ${title}`, (title) => `Forget that no ${title} is there`);
+    list("unsure", (title) => `Not known: ${title}`, (title) => `Ask about ${title} again`);
     if (!answer?.estimate || answer.quick) return;
     // After a pause, so that the next answer does not have to wait.
     waiting = setTimeout(async () => {
@@ -234,20 +236,47 @@ semsig.suggest = (session) => {
       } catch {
         return;  // the answer shows the error
       }
-      const ask = ([offer, ...others]) => {
+      if (session.answer !== answer) return;
+      const offer = offers.find(({class: name}) => !session.unsure.includes(name));
+      line.replaceChildren(listed);
+      if (!offer) return;
+      semsig.text(line, "b", offer.question);
+      semsig.button(line, "Yes, I mark it", () => {
+        session.next = offer.class;
         line.replaceChildren(listed);
-        if (!offer || session.answer !== answer) return;
-        semsig.text(line, "b", offer.question);
-        semsig.button(line, "Yes, I mark it", () => {
-          session.mark = null;
-          semsig.rename(session, offer.class);
-          semsig.showScene(session);
-        });
-        if (first) semsig.button(line, "No", () => setAbsent([...session.absent, offer.class]));
-        if (others.length) semsig.button(line, "Ask another", () => ask(others));
-      };
-      ask(offers);
+        semsig.text(line, "b", `Click the ${offer.title.toLowerCase()}.`);
+      });
+      if (first) semsig.button(line, "No", () => set({absent: [...session.absent, offer.class]}));
+      semsig.button(line, "Don\u2019t know",
+        () => set({unsure: [...session.unsure, offer.class]}));
     }, 400);
+  });
+};
+// Whether marks may be lost: asks if some are not saved.
+semsig.mayLose = (session, what) => !session.unsaved || window.confirm(
+  `${what} removes the current marks, which are not saved. Continue?`);
+semsig.history = (session) => {
+  const [undo, redo] = ["undo", "redo"].map(semsig.element);
+  const show = () => {
+    undo.disabled = !session.past.length;
+    redo.disabled = !session.future.length;
+  };
+  undo.addEventListener("click", () => session.undo());
+  redo.addEventListener("click", () => session.redo());
+  session.addEventListener("change", show);
+  show();
+  document.addEventListener("keydown", (event) => {
+    const {key, target} = event;
+    if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+    if (target.closest("input:not([type=range]), textarea, dialog")) return;
+    const letter = key.toLowerCase();
+    if (letter === "y" || (letter === "z" && event.shiftKey)) session.redo();
+    else if (letter === "z") session.undo();
+    else return;
+    event.preventDefault();
+  });
+  window.addEventListener("beforeunload", (event) => {
+    if (session.unsaved) event.preventDefault();
   });
 };
 semsig.simulate = (session, map) => {
@@ -291,12 +320,16 @@ semsig.simulate = (session, map) => {
 semsig.files = (session) => {
   const {element, trying} = semsig;
   element("new").addEventListener("click", () => {
+    if (!semsig.mayLose(session, "A new question")) return;
     session.clear();
     session.show(null);
     session.changed();
   });
-  element("save").addEventListener("click", () => semsig.download("session.semsig.json",
-    new Blob([JSON.stringify(session.saved(), null, 1)], {type: "application/json"})));
+  element("save").addEventListener("click", () => {
+    session.savedPresent = session.present;
+    semsig.download("session.semsig.json",
+      new Blob([JSON.stringify(session.saved(), null, 1)], {type: "application/json"}));
+  });
   const open = async (file) => {
     let saved = null;
     try {
@@ -309,7 +342,7 @@ semsig.files = (session) => {
   element("open").addEventListener("change", trying(async () => {
     const [file] = element("open").files;
     element("open").value = "";
-    if (file) await open(file);
+    if (file && semsig.mayLose(session, "Another session")) await open(file);
   }));
   element("format").addEventListener("change", trying(async () => {
     const format = element("format").value;
@@ -340,14 +373,17 @@ semsig.keys = (session) => {
   document.addEventListener("keydown", (event) => {
     const {target, key} = event;
     if (event.ctrlKey || event.metaKey || event.altKey || !session.scene) return;
-    if (target.closest("input, select, textarea, dialog")) return;
-    const named = [...session.city.classes, semsig.unnamed].find(
-      ({symbol}) => symbol === key) || session.city.classes.find(
-      ({symbol}) => symbol.toLowerCase() === key.toLowerCase());
-    if (named) semsig.rename(session, named.name);
+    if (target.closest("input, select, textarea, dialog, #classes, #map")) return;
+    const factor = {"+": 1.5, "=": 1.5, "-": 1 / 1.5}[key];
+    const step = {
+      ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60]}[key];
+    if (factor && session.scene.marks) semsig.zoomPhoto.zoomMiddle(factor);
+    else if (step && target.matches(".stage.zoomed")) semsig.zoomPhoto.moveBy(...step);
     else if (session.mark && ["Delete", "Backspace"].includes(key)) semsig.removeMark(session);
     else if (session.mark && key === "Escape") session.show(session.scene);
-    else return;
+    else if (session.mark && /^\p{L}$/u.test(key)) {
+      semsig.askClass(session, session.mark, null, false, key);
+    } else return;
     event.preventDefault();
   });
 };
@@ -359,11 +395,9 @@ semsig.cityMap = (city) => {
   L.control.scale({imperial: false}).addTo(map);
   L.imageOverlay(city.image.url, city.image.bounds, {
     pane: "tilePane", className: "semsig-flip"}).addTo(map);
-  for (const licence of city.licences) {
-    const text = L.DomUtil.create("bdi", "");
-    text.textContent = licence;
-    map.attributionControl.addAttribution(text.outerHTML);
-  }
+  const credit = L.DomUtil.create("bdi", "");
+  credit.textContent = `\u00a9 ${city.credit}`;
+  map.attributionControl.setPrefix(false).addAttribution(credit.outerHTML);
   new ResizeObserver(() => map.invalidateSize({pan: false})).observe(map.getContainer());
   // The whole page has light or dark colours like its map.
   map.on("semsig-colours", () => document.body.classList.toggle("dark", semsig.isDark(map)));
@@ -391,7 +425,7 @@ semsig.start = semsig.trying(async () => {
   const map = semsig.cityMap(city);
   const answer = new semsig.Answer(session, map);
   semsig.element("city").textContent = `${city.name}, ${city.cells.toLocaleString("en")} cells`;
-  semsig.element("about").textContent = city.licences.join(" · ");
+  semsig.element("about").textContent = [...city.licences, "Map drawn by Leaflet"].join(" · ");
   semsig.palette(session);
   const noise = semsig.element("noise");
   const observers = {
@@ -418,6 +452,7 @@ semsig.start = semsig.trying(async () => {
   });
   session.addEventListener("change", () => semsig.showScene(session));
   map.on("semsig-colours", () => answer.draw());
+  semsig.history(session);
   semsig.suggest(session);
   semsig.simulate(session, map);
   semsig.files(session);

@@ -84,10 +84,19 @@ semsig.wheel = (
   semsig.svg(drawing, "circle", {r: 54, class: "ring"});
   semsig.svg(drawing, "path", {d: "M0,-67L4,-56H-4Z", class: "north"});
   semsig.svg(drawing, "circle", {r: 1.5, class: "north"});
-  // Signs are placed on circles, so that those that would overlap move nearer to the middle.
-  const size = !types ? 3 : bearings.length <= 16 ? 6 : 5.2;
+  const size = !types ? 3 : bearings.length <= 16 ? 6 : bearings.length <= 30 ? 5.2 : 4.2;
+  // With distances the drawing is to scale; what has none stands on the rim.
+  const reach = 52 - 2 * size;
+  if (look.metres) {
+    for (const part of [0.5, 1]) {
+      semsig.svg(drawing, "circle", {r: reach * part, class: "scale"});
+      semsig.svg(drawing, "text", {x: 0, y: reach * part + 5, class: "scale"},
+        `${Math.round(look.reach * part)} m`);
+    }
+  }
+  // Without distances, signs that would overlap move from the rim nearer to the middle.
   const circles = [];
-  for (let radius = 52 - size; radius > size; radius -= 2.2 * size) {
+  for (let radius = look.metres ? 54 : 52 - size; radius > size; radius -= 2.2 * size) {
     circles.push({radius, angles: []});
   }
   places.forEach((angle, index) => {
@@ -95,20 +104,19 @@ semsig.wheel = (
       const turn = Math.abs(angle - other) % (2 * Math.PI);
       return Math.min(turn, 2 * Math.PI - turn);
     })) * radius;
-    // A known distance determines the preferred circle.
     const metres = look.metres?.[index] ?? null;
-    const out = metres === null ? 54 : Math.min(1, metres / look.reach) * circles[0].radius;
-    const nearest = [...circles].sort(
-      (a, b) => Math.abs(a.radius - out) - Math.abs(b.radius - out));
-    const free = nearest.find((circle) => room(circle) >= 2.2 * size)
-      || circles.reduce((best, circle) => (room(circle) > room(best) ? circle : best));
+    const free = metres !== null
+      ? {radius: Math.min(1, metres / look.reach) * reach, angles: []}
+      : look.metres ? circles[0]
+        : circles.find((circle) => room(circle) >= 2.2 * size)
+          || circles.reduce((best, circle) => (room(circle) > room(best) ? circle : best));
     free.angles.push(angle);
     const verdict = comparison[index]?.verdict ?? (look.outside?.includes(index) ? "outside" : "");
     const object = semsig.svg(drawing, "g", {
       class: `object ${verdict}`, role: "img", tabindex: index ? -1 : 0,
       "aria-label": [entries[index], classes[types?.[index]]?.title].filter(Boolean).join(", "),
     });
-    if (metres === null) {
+    if (!look.metres) {
       const [[x, y], [outX, outY]] = [at(angle, free.radius + size), at(angle, 54)];
       semsig.svg(object, "line", {x1: x, y1: y, x2: outX, y2: outY, class: "ray"});
     }
