@@ -316,21 +316,21 @@ class _Sights:
         places = np.repeat(np.arange(len(cells)), lengths)
         rows = np.arange(len(places)) + np.repeat(starts - np.cumsum(lengths) + lengths, lengths)
         bearings = database.bearing_units[rows] * (FULL_TURN / BEARING_UNITS)
-        seen, marked = np.zeros(len(rows), np.bool_), np.zeros(len(view), np.bool_)
+        inside, in_photo = np.zeros(len(rows), np.bool_), np.zeros(len(view), np.bool_)
         for number, photo in enumerate(view.photos):
             inner = _without_edges(photo)
             turns = headings[number] if number < len(headings) else None
             turn = 0.0 if turns is None else turns[cells][places]
-            seen |= inner.sees(bearings - turn)
-            marked |= (view.photo_rows == number) & inner.sees(view.bearings)
-        kinds = table.row_of[database.codes[rows[seen]]]
+            inside |= inner.sees(bearings - turn)
+            in_photo |= (view.photo_rows == number) & inner.sees(view.bearings)
+        kinds = table.row_of[database.codes[rows[inside]]]
         size = len(table.codes)
-        counted = np.bincount(places[seen] * size + kinds, minlength=len(cells) * size)
+        counted = np.bincount(places[inside] * size + kinds, minlength=len(cells) * size)
         return cls(
             table=table,
             histogram=counted.reshape(-1, size),
             lengths=lengths,
-            counts=Counter([] if view.codes is None else view.codes[marked].tolist()),
+            counts=Counter([] if view.codes is None else view.codes[in_photo].tolist()),
             share=min(sum(photo.width for photo in view.photos) / FULL_TURN, 1.0),
         )
 

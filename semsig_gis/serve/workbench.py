@@ -168,14 +168,14 @@ class Workbench:
         """The facts about the city that the page shows first."""
         database = self.database
         image, bounds = city_image(database)
-        shares, seen = self._shares, database.occurrences
+        shares, occurrences = self._shares, database.occurrences
         signs = class_signs(database.taxonomy)
         ranges = database.taxonomy.ranges(database.spec.radius)
         # The classes that are seen most often come first.
         present = set(database.present_codes.tolist())
         kinds = sorted(
             (item for item in self.taxonomy.classes if item.code in present),
-            key=lambda item: -int(seen[item.code]),
+            key=lambda item: -int(occurrences[item.code]),
         )
         return {
             "name": self.city.path.stem,

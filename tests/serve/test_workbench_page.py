@@ -32,6 +32,12 @@ if TYPE_CHECKING:
 
     from benchmarks.street_photos import StreetPhoto
 
+# The verdicts of the objects of each wheel.
+WHEELS = """
+return [...document.querySelectorAll('#wheels figure')].map((figure) =>
+  [...figure.querySelectorAll('.object')].map(({classList}) => classList[1]));
+"""
+DISTANCE = "return L.latLng(...arguments[0]).distanceTo(L.latLng(...arguments[1]))"
 PLACE, HEADING = 475, 180.0  # a cell with five visible objects ahead, and four behind
 
 
@@ -82,19 +88,14 @@ def test_two_photos_are_localized_saved_and_exported(
     answer_match = re.match(r"Within 50 m of ([\d.]+), ([\d.]+) with a chance of .*%\.", sentence)
     assert answer_match, sentence
     true = to_latlon(page.bench.database.xy[[PLACE]], page.bench.database.crs)[0]
-    metres = "return L.latLng(...arguments[0]).distanceTo(L.latLng(...arguments[1]))"
-    assert workbench.ask(metres, true.tolist(), list(map(float, answer_match.groups()))) < 50
+    assert workbench.ask(DISTANCE, true.tolist(), list(map(float, answer_match.groups()))) < 50
     # The page shows wheels, rays and reasons of the likeliest candidate, and others by buttons.
     captions = [element.text for element in workbench.all("#wheels figcaption")]
     assert captions == ["Marked, to 30 m", "At candidate 1, to 30 m"]
     assert workbench.all("#map path[stroke-width]")
     assert "Speaks for candidate 1" in workbench.text("#speaks")
     # The wheels show the verdicts of the answer.
-    wheels = """
-    return [...document.querySelectorAll('#wheels figure')].map((figure) =>
-      [...figure.querySelectorAll('.object')].map(({classList}) => classList[1]));
-    """
-    marked, there = workbench.ask(wheels)
+    marked, there = workbench.ask(WHEELS)
     rays = workbench.ask("return semsig.session.answer.candidates[0].rays")
     own = [ray["verdict"] for ray in rays if ray["mark"] and ray["mark"][1] == 1]
     assert sorted(marked) == sorted(own)
@@ -312,9 +313,9 @@ def test_marks_and_answers_are_undone_and_not_lost(
 def test_unknown_field_of_view_and_refined_numbers_are_shown(
     workbench: WorkbenchPage, photos: list[StreetPhoto]
 ) -> None:
-    seen = "window.refining = []; new MutationObserver(() => window.refining.push("
     workbench.ask(
-        seen + "!document.getElementById('refining').hidden)).observe("
+        "window.refining = []; new MutationObserver(() => window.refining.push("
+        "!document.getElementById('refining').hidden)).observe("
         "document.getElementById('refining'), {attributes: true});"
     )
     workbench.give("#photo", photos[0].file)
@@ -449,9 +450,9 @@ def test_next_question_is_shown_and_answered(
     workbench.question()
     workbench.press("#question button", "Yes, I mark it")
     assert workbench.question().startswith("Click the ")
-    named = workbench.ask("return semsig.session.next")
+    class_name = workbench.ask("return semsig.session.next")
     workbench.drag(STAGE, (0.1, 0.1))
-    assert workbench.ask("return semsig.session.entries.at(-1).class") == named
+    assert workbench.ask("return semsig.session.entries.at(-1).class") == class_name
     assert not workbench.one("#classes").is_displayed()
 
 

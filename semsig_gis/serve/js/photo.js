@@ -69,7 +69,7 @@ semsig.middleOf = ({box, x, y}) => (box ? [(box[0] + box[2]) / 2, (box[1] + box[
 // Images and zooms of photos by their addresses, so that they stay with every change.
 semsig.images = new Map();
 semsig.zooms = new Map();
-// The box of the current drawing, of which a zoomed photo shows a part; each change draws a new one.
+// The box of the whole drawing, and not only its part in view; each change draws a new one.
 semsig.edge = () => document.querySelector("#picture .sheet").getBoundingClientRect();
 semsig.photo = (session, photo) => {
   const stage = L.DomUtil.create("div", "stage");
@@ -236,10 +236,10 @@ semsig.zoomable = (session, photo, stage, sheet) => {
       document.removeEventListener("pointermove", move);
       document.removeEventListener("pointerup", up);
       document.removeEventListener("pointercancel", up);
-      const alone = fingers.size === 1;
+      const single = fingers.size === 1;
       fingers.delete(now.pointerId);
       if (!fingers.size) stage.classList.remove("pinched");
-      if (!alone || far || !semsig.moving || event.button || now.type !== "pointerup") return;
+      if (!single || far || !semsig.moving || event.button || now.type !== "pointerup") return;
       const edge = semsig.edge();
       semsig.addMark(session, {
         x: (now.clientX - edge.left) / edge.width * photo.width,
