@@ -13,6 +13,7 @@ from typing_extensions import TypedDict
 from semsig_gis.core import BEARING_UNITS, FULL_TURN, InputError
 from semsig_gis.localization.distance.search import DistanceLocator
 from semsig_gis.localization.likelihood.priors import weight_prior
+from semsig_gis.localization.noise.table import query_bearings
 from semsig_gis.observation import View
 
 if TYPE_CHECKING:
@@ -285,7 +286,7 @@ class _Sights:
     """
 
     table: NoiseTable
-    histogram: NDArray[np.int64]
+    histogram: NDArray[np.integer]
     lengths: NDArray[np.int64]
     counts: Counter[int]
     share: float = 1.0
@@ -317,12 +318,13 @@ class _Sights:
         rows = np.arange(len(places)) + np.repeat(starts - np.cumsum(lengths) + lengths, lengths)
         bearings = database.bearing_units[rows] * (FULL_TURN / BEARING_UNITS)
         inside, in_photo = np.zeros(len(rows), np.bool_), np.zeros(len(view), np.bool_)
+        own_bearings = query_bearings(view)
         for number, photo in enumerate(view.photos):
             inner = _without_edges(photo)
             turns = headings[number] if number < len(headings) else None
             turn = 0.0 if turns is None else turns[cells][places]
             inside |= inner.sees(bearings - turn)
-            in_photo |= (view.photo_rows == number) & inner.sees(view.bearings)
+            in_photo |= (view.photo_rows == number) & inner.sees(own_bearings)
         kinds = table.row_of[database.codes[rows[inside]]]
         size = len(table.codes)
         counted = np.bincount(places[inside] * size + kinds, minlength=len(cells) * size)

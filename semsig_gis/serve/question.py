@@ -124,14 +124,14 @@ class PagePhoto(FileTable, extra="ignore"):
         """
         if self.width is None or self.height is None:
             raise InputError("the width or height of a photo is missing; give pixels.")
-        projection = self.projection or "pinhole"
+        projection: Any = self.projection or "pinhole"
         fov = USUAL_FOV.get(str(projection), unknown_fov) if self.fov is None else self.fov
         return Camera(width=self.width, height=self.height, fov=fov, projection=projection)
 
     @property
     def fov_unknown(self) -> bool:
         """Whether it has marks, and no field of view."""
-        return bool(self.marks) and self.fov is None and self.projection in {None, "pinhole"}
+        return bool(self.marks) and self.fov is None and self.projection in (None, "pinhole")
 
 
 class _Step(FileTable, extra="ignore"):

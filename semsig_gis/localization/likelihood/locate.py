@@ -423,7 +423,9 @@ class LikelihoodLocator:
         shares = np.exp(evidence - np.logaddexp.reduce(evidence))
         best, ratio = int(shares.argmax()), None
         if log_prior is not None:
-            first = self.scores(versions[best][0], scanned=scanned and scanned[best]).loglik
+            first = self.scores(
+                versions[best][0], scanned=scanned[best] if scanned else None
+            ).loglik
             if legs:
                 logliks = [first, *(view.loglik for view in scored[best][1:])]
                 start = route_posteriors(database, logliks, legs)[0].chances

@@ -122,10 +122,17 @@ def test_wheels_show_sectors_and_distances_of_a_view(page: MapPage) -> None:
         assert pale == outside.tolist()
         description = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
         assert description.count("(outside)") == outside.sum()
+        # To scale: distances are proportional to the metres.
         out = np.hypot(*np.transpose(page.ask("return signPlaces(arguments[0])", wheel)))
-        assert np.corrcoef(out[:-1], metres[:-1])[0, 1] > 0.8
-    assert len(query.find_elements(By.CSS_SELECTOR, "line.ray")) == 1
-    assert cell.find_elements(By.CSS_SELECTOR, "line.ray") == []
+        scale = out[:-1] / metres[:-1]
+        assert scale == pytest.approx(np.full(len(scale), scale[0]), rel=0.05)
+        rings = wheel.find_elements(By.CSS_SELECTOR, "circle.scale")
+        radii = [float(str(ring.get_attribute("r"))) for ring in rings]
+        assert radii == pytest.approx([15 * scale[0], 30 * scale[0]], rel=0.05)
+        # What has no distance stands on the rim.
+        (rim,) = wheel.find_elements(By.CSS_SELECTOR, "circle.ring")
+        on_rim = float(out[-1]) == pytest.approx(float(str(rim.get_attribute("r"))))
+        assert on_rim == (wheel is query)
 
 
 def test_explanation_shows_sectors_of_photos(page: MapPage) -> None:

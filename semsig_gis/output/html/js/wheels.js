@@ -84,13 +84,13 @@ semsig.wheel = (
   semsig.svg(drawing, "circle", {r: 54, class: "ring"});
   semsig.svg(drawing, "path", {d: "M0,-67L4,-56H-4Z", class: "north"});
   semsig.svg(drawing, "circle", {r: 1.5, class: "north"});
-  const size = !types ? 3 : bearings.length <= 16 ? 6 : bearings.length <= 30 ? 5.2 : 4.2;
+  const size = !types ? 3 : bearings.length <= 16 ? 6 : 5.2;
   // With distances the drawing is to scale; what has none stands on the rim.
   const reach = 52 - 2 * size;
   if (look.metres) {
     for (const part of [0.5, 1]) {
       semsig.svg(drawing, "circle", {r: reach * part, class: "scale"});
-      semsig.svg(drawing, "text", {x: 0, y: reach * part + 5, class: "scale"},
+      semsig.svg(drawing, "text", {x: 0, y: reach * part + 6.5, "font-size": 6.8, class: "scale"},
         `${Math.round(look.reach * part)} m`);
     }
   }
