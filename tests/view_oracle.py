@@ -73,6 +73,7 @@ class Glimpse:
 
     bearing: float
     weights: Sequence[float]
+    bearing_error: float = 0.0
     range: float = math.nan
     range_error: float = math.nan
 
@@ -120,12 +121,13 @@ def false_density(glimpse: Glimpse, scene: Scene) -> float:
 def hit_density(glimpse: Glimpse, thing: Thing) -> float:
     """Return the density of an object being detected so: hit_ij."""
     away = abs((glimpse.bearing - thing.bearing + 180.0) % 360.0 - 180.0)
-    if away > min(thing.tails * thing.bearing_sigma, 180.0):
+    sigma = min(math.hypot(thing.bearing_sigma, glimpse.bearing_error), 180.0)
+    if away > min(thing.tails * sigma, 180.0):
         return 0.0
     return (
         thing.chance
         * float(np.dot(glimpse.weights, thing.names))
-        * bearing_density(glimpse.bearing - thing.bearing, thing.bearing_sigma)
+        * bearing_density(glimpse.bearing - thing.bearing, sigma)
         * range_density(glimpse, thing)
     )
 
@@ -187,11 +189,20 @@ def glimpses_of(view: View, codes: Sequence[int]) -> list[Glimpse]:
     blank = np.full(len(view), math.nan)
     ranges = blank if view.ranges is None else view.ranges
     errors = blank if view.range_errors is None else view.range_errors
+    rough = blank if view.bearing_errors is None else view.bearing_errors
     weights = class_weights(view, codes).tolist()
-    rows = zip(view.bearings.tolist(), weights, ranges.tolist(), errors.tolist(), strict=True)
+    columns = (view.bearings, ranges, errors, np.nan_to_num(rough))
     return [
-        Glimpse(bearing=bearing, weights=chances, range=metres, range_error=error)
-        for bearing, chances, metres, error in rows
+        Glimpse(
+            bearing=bearing,
+            weights=chances,
+            range=metres,
+            range_error=error,
+            bearing_error=more,
+        )
+        for chances, bearing, metres, error, more in zip(
+            weights, *(column.tolist() for column in columns), strict=True
+        )
     ]
 
 
@@ -295,7 +306,8 @@ def random_view(
 ) -> View:
     """Return a view of random detections, half near objects of the first cell.
 
-    A third have ranges, a third of these errors of their own, and a third have scores.
+    A third have ranges, a third of these errors of their own, a third have scores, and a third
+    rough bearings.
     """
     parts, codes = [], database.present_codes
     first = visible_objects_in(database, np.array([0]))
@@ -307,7 +319,7 @@ def random_view(
         )
         metres = np.maximum(first.distances[near], 1.0) * np.exp(rng.normal(0, 0.3, size))
         names = np.where(real, first.codes[near], rng.choice(np.append(codes, 0), size))
-        sure, ranged, own = rng.random((3, size)) > 1 / 3
+        sure, ranged, own, exact = rng.random((4, size)) > 1 / 3
         scores = np.eye(256)[names]
         for row in np.flatnonzero(~sure):
             scores[row] = 0.0
@@ -319,6 +331,7 @@ def random_view(
                 bearings % 360.0,
                 ranges=np.where(ranged, np.nan, metres),
                 range_errors=np.where(own, np.nan, rng.uniform(0.1, 0.5, size)),
+                bearing_errors=np.where(exact, np.nan, rng.uniform(2.0, 40.0, size)),
                 scores=None if sure.all() else scores,
                 photos=(photo,),
             )

@@ -119,7 +119,8 @@ class Evidence:
         inside, _ = self.detections.inside(self.owners, views.bearings, spreads)
         units = distance_units_of(self.distances, table.reach)
         mask = (inside > 0) | (table.leaving[self.kinds, units] > 0)
-        close = np.abs(pairs.away) <= FARTHEST * spreads[pairs.objects]
+        rough = self.detections.bearing_errors[pairs.detections]
+        close = np.abs(pairs.away) <= FARTHEST * np.hypot(spreads[pairs.objects], rough)
         mask[pairs.objects[close]] = True
         rows, ends = np.append(0, np.cumsum(mask)), np.append(0, np.cumsum(close))
         return replace(
@@ -314,7 +315,9 @@ def _bearing_errors(
     squares = (evidence.pairs.away * share) ** 2 + place**2 * share
     # At the edge of a sector, objects with large errors are outside.
     whole = share * association.squares[objects] + 1.0 - share
-    return np.stack([squares, whole]) * association.chances
+    # Bearings with errors of their own say nothing about the error of the model.
+    usable = evidence.detections.bearing_errors[evidence.pairs.detections] == 0.0
+    return np.stack([squares, whole]) * (association.chances * usable)
 
 
 def _range_errors(

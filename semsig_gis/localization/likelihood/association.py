@@ -108,6 +108,7 @@ class Detections:
     photos: tuple[PhotoTable, ...]
     starts: NDArray[np.int64]
     bearings: NDArray[np.float64]
+    bearing_errors: NDArray[np.float64]
     ranges: NDArray[np.float64]
     range_errors: NDArray[np.float64]
     scores: NDArray[np.float64]
@@ -118,7 +119,7 @@ class Detections:
         """Return the detections of views with bearings, for the classes of a table."""
         parts = [part for view in views for part in View.of(view).split()]
         photos = tuple(PhotoTable.of(part, table) for part in parts)
-        names = ("bearings", "ranges", "range_errors", "scores", "disc")
+        names = ("bearings", "bearing_errors", "ranges", "range_errors", "scores", "disc")
         joined = {
             name: np.concatenate([getattr(photo, name) for photo in photos], axis=-1)
             for name in names
@@ -212,7 +213,8 @@ def associate(
     floor = (clutter + arriving) * photos.disc / FULL_TURN
     # By pair: the odds of detection, times the densities of bearing, name and range over the floor.
     objects, detections = pairs.objects, pairs.detections
-    weights = (detection / missed)[objects] * _bearing_densities(pairs.away, spreads[objects])
+    rough = np.minimum(np.hypot(spreads[objects], photos.bearing_errors[detections]), HALF_TURN)
+    weights = (detection / missed)[objects] * _bearing_densities(pairs.away, rough)
     weights *= name_chances[row[owners[objects]], kinds[objects], detections] / floor[detections]
     ranged = np.flatnonzero(~np.isnan(photos.ranges[detections]))
     if len(ranged):

@@ -149,6 +149,7 @@ def sum_associations(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
     offsets, kinds, beyond = objects.offsets, objects.kinds, objects.beyond
     bearing_units, distance_units = objects.bearing_units, objects.distance_units
     bearings, ranges, range_sigma = photo.bearings, photo.ranges, photo.range_sigma
+    bearing_errors = photo.bearing_errors
     own, other, density, disc = photo.own, photo.other, photo.density, photo.disc
     sectors, log_prior = photo.sectors, turns.log_prior
     detected, misnamed = models.detected, models.misnamed
@@ -179,9 +180,10 @@ def sum_associations(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
     near = np.empty((most, room))
     values = np.empty(room)
     sums = np.empty(room)
-    ranged = False
+    ranged = rough = False
     for detection in range(size):
         ranged |= not math.isnan(ranges[detection])
+        rough |= bearing_errors[detection] > 0.0
     # If all models have the same errors of bearings and ranges, densities are computed once.
     same_errors = True
     for model in range(1, count_models):
@@ -246,6 +248,18 @@ def sum_associations(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
                                 )
                         own_near = near[entry]
                         _densities(angles, bearing, spread, own_near)
+                        if rough:
+                            for detection in range(size):
+                                if bearing_errors[detection] > 0.0:
+                                    _densities(
+                                        angles[detection : detection + 1],
+                                        bearing,
+                                        min(
+                                            math.hypot(spread, bearing_errors[detection]),
+                                            FULL_TURN / 2.0,
+                                        ),
+                                        own_near[detection : detection + 1],
+                                    )
                         if ranged:
                             metres = distances[unit]
                             for detection in range(size):

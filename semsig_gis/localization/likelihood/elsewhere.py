@@ -138,16 +138,29 @@ def goodness_of_fit(
         look = photo.photos[0].turned(heading)
         inside = look.sees(BINS) if look.sectors else np.ones(len(BINS), np.bool_)
         rows = ((detections.bearings + heading) % FULL_TURN).astype(np.int64)
-        for row, scores in zip(rows.tolist(), detections.scores.T, strict=True):
-            total += math.log(scores @ mean[:, row])
+        errors = detections.bearing_errors.tolist()
+        for row, error, scores in zip(rows.tolist(), errors, detections.scores.T, strict=True):
+            blurred_mean, *blurred = (_blurred(values, error) for values in (mean, *densities))
+            total += math.log(scores @ blurred_mean[:, row])
             bins = []
-            for density, count in zip(densities, counts.tolist(), strict=True):
+            for density, count in zip(blurred, counts.tolist(), strict=True):
                 chances = np.cumsum(density[:, inside])
                 bins.append(np.searchsorted(chances, random.random(count) * chances[-1]))
             # Of an object of unknown class, only the direction is compared.
-            logs = np.log(mean.sum(axis=0) + 0.0 * mean if scores.all() else mean)
+            of_any = blurred_mean.sum(axis=0) + 0.0 * blurred_mean
+            logs = np.log(of_any if scores.all() else blurred_mean)
             simulated += logs[:, inside].ravel()[np.concatenate(bins)]
     return float(np.mean(simulated <= total + ROUNDING))
+
+
+def _blurred(density: NDArray[np.float64], error: float) -> NDArray[np.float64]:
+    """Return a density by degree of a turn with an error of bearings in degrees added."""
+    if error == 0.0:
+        return density
+    harmonics = np.arange(len(BINS) // 2 + 1)
+    less = np.exp(-0.5 * (harmonics * math.radians(error)) ** 2)
+    blurred = np.fft.irfft(np.fft.rfft(density) * less, len(BINS))
+    return np.maximum(blurred, density.min(axis=-1, keepdims=True))
 
 
 def _density(database: SignatureDatabase, table: NoiseTable, cell: int) -> NDArray[np.float64]:

@@ -55,7 +55,10 @@ class IncrementalIndex:
         if north_sigma == 0.0:
             return photo_scorer(photo, index.levels, 0.0)(index.objects)
         setting = photo.photos[0].sectors, north_sigma
-        values = (photo.codes, photo.bearings, photo.ranges, photo.range_errors, photo.scores)
+        values = [
+            getattr(photo, name)
+            for name in ("codes", "bearings", "bearing_errors", "ranges", "range_errors", "scores")
+        ]
         marks = [
             b"|".join(b"" if value is None else value[row].tobytes() for value in values)
             for row in range(len(photo))

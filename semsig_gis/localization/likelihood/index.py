@@ -341,6 +341,16 @@ def _turned(rows: NDArray[np.float32]) -> NDArray[np.float32]:
     return turned
 
 
+def _wrapped_normal(away: NDArray[np.float64], sigma: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the density of deviations in degrees from one turn away, for each of some sigmas."""
+    density = np.zeros((*sigma.shape, len(away)))
+    for lap in LAPS:
+        density += np.exp(-0.5 * ((away + FULL_TURN * lap) / sigma[..., None]) ** 2)
+    density /= sigma[..., None] * math.sqrt(2.0 * math.pi)
+    density[density < LEAST_DENSITY] = 0.0
+    return density
+
+
 def _padded(values: NDArray[np.float64]) -> NDArray[np.float32]:
     """Pad the last axis with zeros to a whole number of blocks; return float32."""
     size = values.shape[-1]
@@ -399,13 +409,7 @@ class NoiseLevels:
             )
         turned = np.degrees(table.position_sigma / distances)
         sigma = np.minimum(np.hypot(groups[:, :1], turned), FULL_TURN / 2.0)
-        # The density of the wrapped normal distribution of a bearing.
-        away = np.arange(FINE) * (FULL_TURN / FINE)
-        fine = np.zeros((*sigma.shape, FINE))
-        for lap in LAPS:
-            fine += np.exp(-0.5 * ((away + FULL_TURN * lap) / sigma[..., None]) ** 2)
-        fine /= sigma[..., None] * math.sqrt(2.0 * math.pi)
-        fine[fine < LEAST_DENSITY] = 0.0
+        fine = _wrapped_normal(np.arange(FINE) * (FULL_TURN / FINE), sigma)
         # If the chances do not depend on the length of a signature, one row does for all lengths.
         same = (detected == detected[0]).all() and (table.misnamed == table.misnamed[0]).all()
         return cls(
@@ -455,6 +459,12 @@ class NoiseLevels:
         shifts = np.rint(photo.bearings * (FINE / FULL_TURN)).astype(np.int64)
         near[near < LEAST_DENSITY] = 0.0
         profile_rows(self.fine, shifts, near.astype(np.float32), rows)
+        for detection in np.flatnonzero(photo.bearing_errors).tolist():
+            sigma = np.hypot(self.sigma, photo.bearing_errors[detection])
+            away = (np.arange(BINS) + 0.5) * (FULL_TURN / BINS) - photo.bearings[detection]
+            density = _wrapped_normal(away, np.minimum(sigma, FULL_TURN / 2.0))
+            block, lane = divmod(detection, LANES)
+            rows[block, ..., lane] = near[..., detection, None] * density
         return rows
 
     def masses(self, photo: PhotoTable) -> NDArray[np.float32]:

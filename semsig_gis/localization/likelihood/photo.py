@@ -58,13 +58,15 @@ LOST_SHARE = 3e-3  # of a sum, that negligible terms together may have
 class PhotoTable:
     """The n detections of one photo, for noise tables of k classes.
 
-    `ranges` and `range_errors` are NaN if unknown. `scores`, shape (k, n), are the scores of the
+    `bearing_errors` are added to those of the noise table, 0 for none. `ranges` and `range_errors`
+    are NaN if unknown. `scores`, shape (k, n), are the scores of the
     classes. `disc` is the density of the logarithm of the range of a false detection, 1 without a
     range. `sectors`, shape (s, 2), are empty for a full turn; `width` is the share of a full turn
     that the photo shows.
     """
 
     bearings: NDArray[np.float64]
+    bearing_errors: NDArray[np.float64]
     ranges: NDArray[np.float64]
     range_errors: NDArray[np.float64]
     scores: NDArray[np.float64]
@@ -93,9 +95,11 @@ class PhotoTable:
             shared = np.where(any_class < 1.0, any_class / len(table.codes), 1.0)
             scores = photo.scores[:, table.codes].T + shared
         errors = unknown if photo.range_errors is None else photo.range_errors
+        rough = np.zeros(size) if photo.bearing_errors is None else photo.bearing_errors
         (look,) = photo.photos
         return cls(
             bearings=photo.bearings,
+            bearing_errors=np.nan_to_num(rough),
             ranges=ranges,
             range_errors=errors,
             scores=scores.astype(np.float64),
@@ -112,6 +116,7 @@ class PhotoTable:
         """Return the photo and its names by some tables, as the kernel takes them."""
         return PhotoArrays(
             bearings=self.bearings,
+            bearing_errors=self.bearing_errors,
             ranges=self.ranges,
             range_sigma=np.stack([self.range_sigma(table) for table in tables]),
             own=self.scores,

@@ -73,7 +73,8 @@ class PlaceObjects(NamedTuple):
 class PhotoArrays(NamedTuple):
     """A photo of n detections, for `association_kernels.sum_associations`.
 
-    `ranges` are NaN where unknown, `range_sigma`, shape (models, k, n), their relative errors. The
+    `bearing_errors` are added to those of the models, 0 for none. `ranges` are NaN where unknown,
+    `range_sigma`, shape (models, k, n), their relative errors. The
     score of a name is `own`, shape (k, n), if the class is right, and `other`, shape (models, k,
     n), if the object is misnamed; `density`, shape (models, n), is that of false detections, in
     which `disc` (n,) is the factor of the range. `sectors`, shape (s, 2), are empty if the photo
@@ -81,6 +82,7 @@ class PhotoArrays(NamedTuple):
     """
 
     bearings: NDArray[np.float64]
+    bearing_errors: NDArray[np.float64]
     ranges: NDArray[np.float64]
     range_sigma: NDArray[np.float64]
     own: NDArray[np.float64]
