@@ -280,7 +280,7 @@ def _known_sentences(knowledge: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
-    """Return an object of a query: ``street light at 80°, 7.3 m away``."""
+    """Return an object of a query: ``street light at 80° ± 13° 7.3 m away``."""
     parts = []
     if view.scores is not None:
         scores = enumerate(view.scores[row].tolist())
@@ -290,7 +290,9 @@ def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
     else:
         parts.append("something" if view.codes is None else taxonomy.words([view.codes[row]]))
     if view.bearings is not None:
-        parts.append(f"at {view.bearings[row]:.4g}°")
+        error = math.nan if view.bearing_errors is None else view.bearing_errors[row]
+        spread = "" if math.isnan(error) else f" ± {error:.2g}°"
+        parts.append(f"at {view.bearings[row]:.4g}°{spread}")
     if view.ranges is not None and not math.isnan(view.ranges[row]):
         parts.append(f"{view.ranges[row]:.2g} m away")
     return " ".join(parts)

@@ -99,6 +99,16 @@ def test_views_with_sectors_and_ranges_have_a_likelihood_elsewhere() -> None:
     assert background_loglik(FEW, ranged) == pytest.approx(whole + math.log(2.0))
 
 
+def test_rough_bearings_fit_where_exact_ones_do_not() -> None:
+    view = View.of(INDEX.database.signature(0)).turned(20.0)
+    rough = replace(view, bearing_errors=np.full(len(view), 26.0))
+    exact_fit, rough_fit = (goodness_of_fit(INDEX, each, 0, [0.0]) for each in (view, rough))
+    assert exact_fit is not None
+    assert rough_fit is not None
+    assert exact_fit < 0.2 < rough_fit
+    assert INDEX.scores(rough).loglik[0] > INDEX.scores(view).loglik[0]
+
+
 def test_views_without_objects_say_nothing() -> None:
     for views in ([NOTHING], [NOTHING, NOTHING]):
         assert evidence_ratio(INDEX, views, -3.0) == 0.0
