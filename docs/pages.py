@@ -59,13 +59,27 @@ options. `semsig schema` prints the same for programs: the JSON Schema of the op
 """
 API = """# Python names
 
-The most used names are imported from `semsig_gis` and listed here, by the package that defines
-them. Each package exports more names, such as `semsig_gis.localization.search_regions`; `dir` lists
-them. Names that are only in modules may change without notice.
-
 ```python
 import semsig_gis as sg
 ```
+
+Most work needs twenty names:
+"""
+TASKS = {
+    "Open": ("load", "objects_from_frame", "open_city", "load_catalog"),
+    "Build": ("build", "City", "update_file"),
+    "Ask": (
+        *("localize", "localize_many", "parse_view", "Location"),
+        *("locate_route", "evaluate", "identify"),
+    ),
+    "Draw": ("location_map", "city_map", "evaluation_map"),
+    "Save": ("export_answer", "export_database", "save_map"),
+}
+MORE = """## More
+
+The other names that `semsig_gis` has are listed by the package that defines them. Each package
+exports more names, such as `semsig_gis.localization.search_regions`; `dir` lists them. Names that
+are only in modules may change without notice.
 
 The examples begin from `demo_objects` and `demo_database`: the street objects of a made-up town of
 300 m, and the signatures of its cells.
@@ -228,9 +242,20 @@ def public_names() -> dict[str, list[str]]:
 def api_pages() -> Iterable[tuple[str, str]]:
     """Yield the name and the text of the page of every package, and of their list."""
     packages = public_names()
-    yield "index", listed(API, {package: (package, package_line(package)) for package in packages})
+    head = "\n".join([API, *map(task_table, TASKS), MORE])
+    yield "index", listed(head, {package: (package, package_line(package)) for package in packages})
     for package, names in packages.items():
         yield package, api_page(package, names)
+
+
+def task_table(task: str) -> str:
+    """Return a heading and a table of the most used names for a task."""
+    rows = []
+    for name in TASKS[task]:
+        line = (getattr(semsig_gis, name).__doc__ or "").partition("\n")[0]
+        rows.append(f"| {{py:obj}}`{name} <semsig_gis.{name}>` | {marked(line)} |")
+    table = "\n".join(["| Name | What it does |", "| --- | --- |", *rows])
+    return f"## {task}\n\n{table}\n"
 
 
 def package_line(package: str) -> str:

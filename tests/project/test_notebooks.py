@@ -45,7 +45,7 @@ def code_of(path: Path) -> list[tuple[str, str]]:
 def test_the_folder_lists_its_notebooks() -> None:
     listed = re.findall(r"\]\((\d\d_\w+\.ipynb)\)", (FOLDER / "README.md").read_text("utf-8"))
     assert listed == [path.name for path in NOTEBOOKS]
-    assert [name[:2] for name in listed] == [f"{number:02}" for number in range(1, 8)]
+    assert [name[:2] for name in listed] == [f"{number:02}" for number in range(1, 9)]
 
 
 @each_notebook
