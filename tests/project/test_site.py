@@ -162,6 +162,12 @@ def test_every_command_and_every_public_name_is_documented_once(pages: dict[str,
     assert places == Counter(dir(semsig_gis))
 
 
+def test_twenty_names_are_listed_by_task(pages: dict[str, Page]) -> None:
+    links = re.findall(r"#semsig_gis\.(\w+)", "\n".join(pages["api/index"].links))
+    assert len(links) == len(set(links)) == 20
+    assert set(links) <= set(dir(semsig_gis))
+
+
 def test_every_thumbnail_of_the_gallery_shows_a_file_of_a_command() -> None:
     text = (DOCS / "gallery.md").read_text(encoding="utf-8")
     targets = re.findall(r"^:target: gallery/(\S+)$", text, re.MULTILINE)
