@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
+import threading
 from typing import TYPE_CHECKING
 
 import lazy_loader
@@ -74,6 +76,23 @@ class Footprints(Displayed):
 
     def __len__(self) -> int:  # noqa: D105
         return len(self._polygons)
+
+    def joined(self, other: Footprints) -> Footprints:
+        """Return these footprints and others that do not touch them, without preparing them again.
+
+        Both have the same tolerance.
+        """
+        both = copy.copy(self)
+        start = len(self.interiors)
+        vars(both).pop("_tree", None)
+        vars(both).update(
+            repaired=self.repaired + other.repaired,
+            interiors=np.concatenate([self.interiors, other.interiors]),
+            _polygons=np.concatenate([self._polygons, other._polygons]),
+            _widened=np.concatenate([self._widened, other._widened]),
+            _cores=self._cores | {start + row: own for row, own in other._cores.items()},
+        )
+        return both
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -239,6 +258,37 @@ def _component_labels(
             return label
 
 
+class NearbyFootprints:
+    """The footprints around places in a city, each prepared when a place near it is asked for.
+
+    `polygons` are the footprints of the city in a metric CRS.
+    """
+
+    def __init__(self, polygons: NDArray[np.object_]) -> None:
+        self._polygons = polygons[~_flat(polygons)]
+        self._tree = shapely.STRtree(self._polygons)
+        self._ready = np.zeros(len(self._polygons), bool)
+        self._footprints: Footprints | None = None
+        self._lock = threading.Lock()
+
+    def around(self, places: NDArray[np.float64], *, distance: float) -> Footprints | None:
+        """Return at least the footprints within `distance` metres of places, shape (p, 2).
+
+        None if there are none. Those joined to them are included.
+        """
+        rows = self._tree.query(shapely.points(places), predicate="dwithin", distance=distance)[1]
+        if not len(rows):
+            return None
+        with self._lock:
+            new = _with_joined(self._tree, self._polygons, rows[~self._ready[rows]])
+            if len(new):
+                more = Footprints(self._polygons[new])
+                ready = self._footprints
+                self._footprints = more if ready is None else ready.joined(more)
+                self._ready[new] = True
+            return self._footprints
+
+
 def buildings_near(
     polygons: NDArray[np.object_], places: NDArray[np.float64], *, distance: float
 ) -> NDArray[np.int64]:
@@ -247,13 +297,28 @@ def buildings_near(
     Buildings joined to them are included: occlusion treats a block of houses as one shape.
     """
     tree = shapely.STRtree(polygons)
-    mask = np.zeros(len(polygons), bool)
     rows = tree.query(shapely.points(places), predicate="dwithin", distance=distance)[1]
+    return _with_joined(tree, polygons, rows)
+
+
+def _with_joined(
+    tree: shapely.STRtree, polygons: NDArray[np.object_], rows: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return rows of polygons and of all that are joined to them, ascending."""
+    mask = np.zeros(len(polygons), bool)
+    rows = np.unique(rows)
     while len(rows):
         mask[rows] = True
         touching = tree.query(polygons[rows], predicate="dwithin", distance=TOUCHING_M)[1]
         rows = np.unique(touching[~mask[touching]])
     return np.flatnonzero(mask)
+
+
+def _flat(polygons: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Return a mask of the polygons without an area, also after repair."""
+    flat: NDArray[np.bool_] = shapely.area(polygons) == 0
+    flat[flat] = shapely.area(shapely.make_valid(polygons[flat])) == 0
+    return flat
 
 
 def footprints_around(
@@ -270,6 +335,4 @@ def footprints_around(
             (*(np.minimum(low, box[:2]) - MARGIN_M), *(np.maximum(high, box[2:]) + MARGIN_M))
         )
     # `Footprints` ignores flat polygons too, but raises if there are no others.
-    flat = shapely.area(near.geometry.to_numpy()) == 0
-    flat[flat] = shapely.area(shapely.make_valid(near.geometry.to_numpy()[flat])) == 0
-    return near[~flat]
+    return near[~_flat(near.geometry.to_numpy())]

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import lazy_loader
+import numpy as np
 
 from semsig_gis import __version__
 from semsig_gis.core import (
@@ -38,7 +39,7 @@ from semsig_gis.database.file import (
     require_file,
     save_database,
 )
-from semsig_gis.database.occlusion import TOLERANCE_M, Footprints, buildings_near
+from semsig_gis.database.occlusion import TOLERANCE_M, NearbyFootprints
 from semsig_gis.database.place_names import NEAR_M, PlaceNames
 from semsig_gis.database.viewpoints import reproject, select_elements
 from semsig_gis.objects import licenses_of, open_objects, save_objects
@@ -57,12 +58,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import geopandas as gpd
-    import numpy as np
     import shapely
     from numpy.typing import NDArray
     from pyproj import CRS
 
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.occlusion import Footprints
     from semsig_gis.objects import StreetObjects
 else:
     gpd = lazy_loader.load("geopandas")
@@ -156,6 +157,11 @@ class ObjectStore(Displayed):
         """
         return self._names.of(x, y)
 
+    @cached_property
+    def _buildings(self) -> NearbyFootprints:
+        shapes = None if self.footprints is None else self.footprints.geometry.to_numpy()
+        return NearbyFootprints(np.empty(0, object) if shapes is None else shapes)
+
     def buildings_around(
         self,
         places: NDArray[np.float64],
@@ -163,7 +169,7 @@ class ObjectStore(Displayed):
         distance: float,
         occlusion: float | None = TOLERANCE_M,
     ) -> Footprints | None:
-        """Return the buildings that hide objects within `distance` metres of some places.
+        """Return at least the buildings that hide objects within `distance` of some places.
 
         Buildings joined to them are included. Places, shape (p, 2), are in metres. None if there
         are none, or `occlusion`, which is that of the database, is None: then the buildings are
@@ -171,9 +177,7 @@ class ObjectStore(Displayed):
         """
         if self.footprints is None or occlusion is None:
             return None
-        polygons = self.footprints.geometry.to_numpy()
-        near = buildings_near(polygons, places, distance=distance)
-        return Footprints(polygons[near]) if len(near) else None
+        return self._buildings.around(places, distance=distance)
 
 
 def _stored(table: gpd.GeoDataFrame, crs: CRS, *names: str) -> gpd.GeoDataFrame:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core import InputError
-from semsig_gis.database import Footprints, buildings_near, hidden, occlusion
+from semsig_gis.database import Footprints, ObjectStore, buildings_near, hidden, occlusion
 from semsig_gis.sources import load_catalog
 from semsig_gis.sources.osm import file as osm_file
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+    from worlds import World
 
 HOUSE = shapely.box(0, 0, 10, 10)
 
@@ -198,3 +199,24 @@ def test_buildings_near_include_their_block() -> None:
     near = buildings_near(houses, np.array([[0.0, -5.0]]), distance=20.0)
     assert near.tolist() == list(range(1, 31))
     assert len(buildings_near(houses, np.array([[0.0, -50.0]]), distance=20.0)) == 0
+
+
+def test_buildings_of_a_store_hide_what_they_hide_together(town: World) -> None:
+    rng = np.random.default_rng(5)
+    corners = rng.uniform(0, 600, (150, 2))
+    sides = rng.uniform(5, 30, (150, 2))
+    houses = shapely.box(*corners.T, *(corners + sides).T)
+    flat = shapely.Polygon([(0, 0), (9, 0), (4, 0)])
+    table = gpd.GeoDataFrame(geometry=[*houses, flat], crs=town.street_objects.crs)
+    store = ObjectStore.of(town.street_objects, footprints=table)
+    together = Footprints(houses)
+    for _ in range(6):  # each time, more of the city is prepared
+        middle = rng.uniform(0, 600, 2)
+        starts = middle + rng.uniform(-25, 25, (200, 2))
+        ends = starts + rng.uniform(-40, 40, (200, 2))
+        near = store.buildings_around(starts, distance=60.0)
+        expected = hidden(starts, ends, footprints=together)
+        assert near is None or np.array_equal(hidden(starts, ends, footprints=near), expected)
+        assert near is not None or not expected.any()
+    assert store.buildings_around(starts, distance=60.0, occlusion=None) is None
+    assert store.buildings_around(np.array([[9e5, 9e5]]), distance=60.0) is None
