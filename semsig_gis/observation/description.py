@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, SupportsFloat, TypeAlias
 
 from semsig_gis.core import InputError, Signature, nearest_name
 from semsig_gis.observation.sentences import (
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 AnyView: TypeAlias = "str | Signature | Row | Iterable[str | Row | tuple[object, ...]]"
 """What was seen, in a form that `read_description` takes."""
 
-DETECTION = ("class", "bearing", "range")
 FORMS = (
     "give a sentence such as 'bench at 40, tree at 120', a list of pairs such as [('bench', 40), "
     "('tree', 120)], a dict as parse_view takes it, or a View"
@@ -50,8 +49,8 @@ def read_description(view: AnyView, *, taxonomy: Taxonomy, radius: float = RADIU
     Parameters
     ----------
     view : str, iterable, dict or Signature
-        A sentence; a list of class names, or of pairs of a name and a bearing in degrees, perhaps
-        with a distance; a row as `parse_view` takes it; or a view.
+        A sentence; a list of parts of one, or of pairs of a name and a bearing in degrees, perhaps
+        with a distance in metres; a row as `parse_view` takes it; detections; or a view.
     taxonomy : Taxonomy
         The classes.
     radius : float, default 30
@@ -90,8 +89,8 @@ def read_description(view: AnyView, *, taxonomy: Taxonomy, radius: float = RADIU
             )
     else:
         items = _items(view)
-        row = {"detections": [_detection(item) for item in items]}
-        in_words = not any(isinstance(item, Mapping) for item in items)
+        in_words = bool(items) and not any(isinstance(item, Mapping) for item in items)
+        row = {"see": ", ".join(map(_phrase, items))} if in_words else {"detections": items}
     parsed, unplaced, absent = parse_seen(row, taxonomy=taxonomy, radius=radius)
     return Description(view=parsed, unplaced=unplaced, absent=absent, in_words=in_words)
 
@@ -103,14 +102,22 @@ def _items(view: Any) -> list[Any]:  # noqa: ANN401 - any value of a user
         raise InputError(f"what was seen is of type {type(view).__name__}; {FORMS}.") from error
 
 
-def _detection(item: Any) -> Row:  # noqa: ANN401 - any value of a user
-    """Return a name, a pair or a row as a detection of `parse_view`."""
-    if isinstance(item, Mapping):
-        return dict(item)
-    values = (item,) if isinstance(item, str) else item
-    if isinstance(values, tuple | list) and 1 <= len(values) <= len(DETECTION):
-        return dict(zip(DETECTION, values, strict=False))
+def _phrase(item: Any) -> str:  # noqa: ANN401 - any value of a user
+    """Return a name, perhaps with a bearing and a distance, as a part of a sentence."""
+    match item:
+        case str(name) | (str(name),):
+            return name
+        case (str(name), bearing):
+            return f"{name} {_direction(bearing)}"
+        case (str(name), bearing, metres):
+            return f"{name} {_direction(bearing)} {metres}" + (
+                " m" if isinstance(metres, SupportsFloat) else ""
+            )
     raise InputError(
         f"{item!r} is not something that was seen; give a name and a bearing, such as "
         "('bench', 40), or a distance in metres as well, such as ('bench', 40, 12)."
     )
+
+
+def _direction(bearing: object) -> str:
+    return f"at {float(bearing):.9f}" if isinstance(bearing, SupportsFloat) else str(bearing)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 from sentences import refused
 from worlds import random_town, save_town
@@ -74,7 +75,7 @@ def test_every_form_of_a_view_gives_the_same_answer(tmp_path: Path) -> None:
     parsed = parse_view({"see": SENTENCE}, taxonomy=CITY.taxonomy)
     by_hand = localize(open_city(path), parsed, method="likelihood:by-hand").to_dict()
     for where in (path, str(path), open_city(path)):
-        for view in (SENTENCE, PAIRS, {"see": SENTENCE}):
+        for view in (SENTENCE, PAIRS, {"see": SENTENCE}, SENTENCE.split(", ")):
             assert localize(where, view).to_dict() == by_hand
     # Rows are those of a detector.
     generic = localize(path, parsed).to_dict()
@@ -88,8 +89,10 @@ def test_class_names_and_ranges_need_no_bearings() -> None:
     assert answer.query.bearings is None
     with refused(InputError, "no explanation"):
         answer.explain()
-    far, near = (localize(CITY, [("tree", 0, metres)]) for metres in (25, 3))
-    assert far.to_dict() != near.to_dict()
+    pairs = [("bench", np.float64(45), 12.5), ("tree", -90), ("street light", "NE", "near")]
+    sentence = "bench at 45 12.5 m, tree at 270, street light NE near"
+    assert localize(CITY, pairs).to_dict() == localize(CITY, sentence).to_dict()
+    assert len(localize(CITY, []).query) == 0
 
 
 def test_absent_and_undirected_objects_are_used() -> None:
