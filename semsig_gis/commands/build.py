@@ -197,7 +197,7 @@ class Build:
                     workers=self.workers,
                     scheduler=self.scheduler,
                     progress=advance,
-                    tell=reporter.remark,
+                    remark=reporter.remark,
                     **specs,
                 )
             cells, entries = manifest.cells, manifest.entries
@@ -221,7 +221,7 @@ class Build:
         from semsig_gis.objects import read_surroundings, with_notes
 
         notes: list[str] = []
-        read = partial(read_surroundings, crs=objects.crs, tell=notes.append)
+        read = partial(read_surroundings, crs=objects.crs, remark=notes.append)
         houses, lines = (
             None if path is None else read(path, role=role) for role, path in ground.items()
         )

@@ -95,7 +95,7 @@ class Fetch(LoadOptions):
             surroundings=self.with_ground,
         )
         store, http = open_cache(
-            self.cache, offline=self.offline, deadline_s=self.timeout, tell=reporter.remark
+            self.cache, offline=self.offline, deadline_s=self.timeout, remark=reporter.remark
         )
         unit: Literal["steps", "bytes"] = "bytes" if catalog.reader == "opendatasoft" else "steps"
         hosts = ", ".join(dict.fromkeys(urlsplit(url).netloc for url in catalog.endpoints))
@@ -114,7 +114,7 @@ class Fetch(LoadOptions):
                 http=http,
                 filters=self.filter,
                 progress=advance,
-                tell=reporter.remark,
+                remark=reporter.remark,
             )
             try:
                 layers = fetch(specs)

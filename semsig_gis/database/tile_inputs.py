@@ -75,7 +75,7 @@ def fingerprint(path: Path) -> str:
 
 
 def copy_with_bounds(
-    name: Input, path: Path, crs: CRS, folder: Path, tell: Callable[[str], None] | None
+    name: Input, path: Path, crs: CRS, folder: Path, remark: Callable[[str], None] | None
 ) -> Path:
     """Copy an input to GeoParquet in `crs`, with the bounds of each row, and return its path."""
     copy = folder / INPUTS / f"{name}.parquet"
@@ -87,7 +87,7 @@ def copy_with_bounds(
     elif name == "objects":  # older files have no bounds
         save_objects(open_objects(path), copy)
     else:
-        save_surroundings(read_surroundings(path, role=name, crs=crs, tell=tell), copy)
+        save_surroundings(read_surroundings(path, role=name, crs=crs, remark=remark), copy)
     return copy
 
 

@@ -148,7 +148,7 @@ def build_tiles(
     workers: int = 0,
     scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
-    tell: Callable[[str], None] | None = None,
+    remark: Callable[[str], None] | None = None,
 ) -> Manifest:
     """Build a signature database in tiles: a folder that can be opened like a file.
 
@@ -171,7 +171,7 @@ def build_tiles(
         files under the same paths, and `workers` must be 0.
     progress : callable, optional
         Called with the number of finished tiles and of all tiles.
-    tell : callable, optional
+    remark : callable, optional
         Called with messages for the user, for example that a run is resumed.
 
     Returns
@@ -220,7 +220,7 @@ def build_tiles(
             viewpoints=viewpoints or ViewpointSpec(),
             buildings=surroundings.get("buildings"),
             streets=surroundings.get("streets"),
-            tell=tell,
+            remark=remark,
         )
         parts = build_parts(
             plan,
@@ -229,7 +229,7 @@ def build_tiles(
             workers=workers,
             scheduler=scheduler,
             progress=progress,
-            tell=tell,
+            remark=remark,
         )
         return publish_tiles(plan.folder, parts)
 
@@ -244,7 +244,7 @@ def build_parts(
     workers: int,
     scheduler: str | None,
     progress: Callable[[int, int], None] | None,
-    tell: Callable[[str], None] | None,
+    remark: Callable[[str], None] | None,
 ) -> list[PartFile]:
     """Build the missing tiles of a plan, and return all parts, ordered by tile.
 
@@ -260,8 +260,8 @@ def build_parts(
         _check_resources(
             plan, tiles, missing=share * len(missing), workers=workers, scheduler=scheduler
         )
-        if results and tell is not None:
-            tell(
+        if results and remark is not None:
+            remark(
                 f"an unfinished run has left {len(results):,} of {len(tiles):,} tiles; resuming it"
             )
 
@@ -361,12 +361,12 @@ def plan_tiles(
     buildings: str | Path | None = None,
     streets: str | Path | None = None,
     digests: Mapping[str, str] | None = None,
-    tell: Callable[[str], None] | None = None,
+    remark: Callable[[str], None] | None = None,
 ) -> TilePlan:
     """Check the inputs of a run, begin or resume it, and return the plan of its tiles.
 
     Streets are only copied unless the viewpoints are ``"streets"``. `digests` replace the computed
-    digests of inputs that are copies. `tell` is called with messages about the files of buildings
+    digests of inputs that are copies. `remark` is called with messages about the files of buildings
     and streets.
     """
     inputs: dict[Input, str | Path | None] = {
@@ -391,7 +391,7 @@ def plan_tiles(
     folder = begin_run(out, recipe)
     try:
         files = {
-            name: copy_with_bounds(name, path, empty.crs, folder, tell)
+            name: copy_with_bounds(name, path, empty.crs, folder, remark)
             for name, path in paths.items()
         }
         lines = files.get("streets") if viewpoints.mode == "streets" else None

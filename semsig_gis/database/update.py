@@ -403,7 +403,7 @@ def update_tiles(
             workers=workers,
             scheduler=scheduler,
             progress=progress,
-            tell=None,
+            remark=None,
         )
         drift = _total_drift(plan, old_tiles, stale)
         old_tiles.stale.unlink()

@@ -96,7 +96,7 @@ def read_surroundings(
     role: Literal["buildings", "streets"],
     crs: AnyCrs,
     box: Sequence[float] | None = None,
-    tell: Callable[[str], None] | None = None,
+    remark: Callable[[str], None] | None = None,
 ) -> gpd.GeoDataFrame:
     """Read the buildings or the streets of a city.
 
@@ -113,7 +113,7 @@ def read_surroundings(
     box : sequence of float, optional
         ``xmin, ymin, xmax, ymax`` in the CRS of a file by `save_surroundings`: only features with
         bounds that intersect it.
-    tell : callable, optional
+    remark : callable, optional
         Called with notes on the file, for example on outlines omitted because they are not closed.
 
     Returns
@@ -134,7 +134,7 @@ def read_surroundings(
     >>> houses.area.round().tolist()
     [25.0]
     """
-    return _read(path, role, crs, box, tell)
+    return _read(path, role, crs, box, remark)
 
 
 def ground_file(objects: str | Path, role: Literal["buildings", "streets"]) -> Path:
@@ -226,7 +226,7 @@ def _read(
     role: Literal["buildings", "streets", "area"],
     crs: AnyCrs,
     box: Sequence[float] | None = None,
-    tell: Callable[[str], None] | None = None,
+    remark: Callable[[str], None] | None = None,
 ) -> gpd.GeoDataFrame:
     kind = KIND_OF[role]
     notes: tuple[str, ...] = ()
@@ -236,9 +236,9 @@ def _read(
         table = table if box is None else table.iloc[np.sort(table.sindex.intersection(box))]
     else:
         table, notes = _read_file(Path(path), role, kind, box)
-    if tell is not None:
+    if remark is not None:
         for note in notes:
-            tell(f"{where}: {note}")
+            remark(f"{where}: {note}")
     if table.crs is None:
         raise SourceError(f"{where} states no coordinate reference system; write it with one.")
     geometry = table.geometry

@@ -19,6 +19,7 @@ from semsig_gis.core import (
     Signature,
     SignatureSpec,
     UnknownNameError,
+    nearest_name,
     wrap_degrees,
     wrapped_bearings,
 )
@@ -191,9 +192,14 @@ def require_seen(row: Row) -> None:
     """Raise InputError if a row has none of the keys `SEEN`, whose values may be empty."""
     # Otherwise a row of another kind would count as a view without objects.
     if all(row.get(name) is None for name in SEEN):
+        hints = (
+            f"the key {key!r} is unknown{near}; "
+            for key in row
+            if key not in LOOK and (near := nearest_name(str(key), SEEN))
+        )
         raise InputError(
-            "it needs types, bearings or both, or detections, see or photos, which may be empty "
-            "where nothing was seen"
+            f"{next(hints, '')}it needs types, bearings or both, or detections, see or photos, "
+            "which may be empty where nothing was seen"
         )
 
 

@@ -36,7 +36,7 @@ def fetch_layers(
     http: HttpSpec,
     filters: bool = True,
     progress: Callable[[int, int], None] | None = None,
-    tell: Callable[[str], None] = lambda _: None,
+    remark: Callable[[str], None] = lambda _: None,
 ) -> tuple[RawLayer, ...]:
     """Fetch layers of an area from the service of a catalogue, and read them.
 
@@ -57,7 +57,7 @@ def fetch_layers(
     progress : callable, optional
         Called with the amount received and the total, 0 if unknown: bytes of a portal's file, rows
         of a paged service, or tiles of an area.
-    tell : callable, optional
+    remark : callable, optional
         Called with a line about each layer that was fetched: rows, size and date.
 
     Returns
@@ -98,7 +98,7 @@ def fetch_layers(
     ):
         layers.append(clip_layer(layer, area))
         rows = size or f"{len(layers[-1]):,} rows"
-        tell(f"{layer.spec.name}: {rows}; {layer.spec.terms}")
+        remark(f"{layer.spec.name}: {rows}; {layer.spec.terms}")
     return tuple(layers)
 
 
@@ -107,7 +107,7 @@ def open_cache(
     *,
     offline: bool = False,
     deadline_s: float = DEFAULT_HTTP.deadline_s,
-    tell: Callable[[str], None] = lambda _: None,
+    remark: Callable[[str], None] = lambda _: None,
 ) -> tuple[Cache, HttpSpec]:
     """Open the cache of downloads.
 
@@ -120,7 +120,7 @@ def open_cache(
         Whether all files come from the cache.
     deadline_s : float, default 600
         Maximum time for a file in seconds, including all attempts and pauses.
-    tell : callable, optional
+    remark : callable, optional
         Called with a line if a server fails and the request will be repeated.
 
     Returns
@@ -135,7 +135,7 @@ def open_cache(
     True
     """
     return Cache(Path(folder or user_cache_path("semsig", appauthor=False))), HttpSpec(
-        offline=offline, deadline_s=deadline_s, report=tell
+        offline=offline, deadline_s=deadline_s, report=remark
     )
 
 

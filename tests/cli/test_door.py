@@ -168,7 +168,7 @@ def test_missing_working_folder_is_refused(
 
 def test_characters_that_the_terminal_cannot_show_are_escaped() -> None:
     process = subprocess.run(
-        [*COMMAND, "sources", "opendata_paris"],
+        [*COMMAND, "sources", "opendata_paris", "--tables"],
         env=os.environ | {"PYTHONIOENCODING": "ascii"},
         capture_output=True,
         check=True,

@@ -470,6 +470,8 @@ def test_every_query_has_an_answer_or_an_error(city: Path, run: Run, method: str
     code, out, err = run(*batch)
     assert (code, "line 1 of queries.jsonl is no query" in err) == (2, True)
     assert json.loads(out)["error"] in err
+    (city / "queries.jsonl").write_text('{"seen": "lamp at 4"}')
+    assert "the key 'seen' is unknown; the nearest is 'see'" in run(*batch)[2]
     (city / "queries.jsonl").write_text("")
     sentence(run(*batch), "no query of queries.jsonl was found")
 

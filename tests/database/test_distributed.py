@@ -156,7 +156,7 @@ def test_a_killed_run_is_resumed(serial: dict[str, bytes], tmp_path: Path) -> No
     before = finished()
     assert 2 <= len(before) < len(serial)  # of three tiles one may have no cell
     messages: list[str] = []
-    assert build(tmp_path, tell=messages.append) == serial
+    assert build(tmp_path, remark=messages.append) == serial
     assert before.items() <= finished().items()
     assert len(messages) == 1
     assert "unfinished run" in messages[0]

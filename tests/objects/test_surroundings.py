@@ -57,7 +57,7 @@ def test_buildings_and_streets_of_an_openstreetmap_file(tmp_path: Path) -> None:
     streets = read_surroundings(path, role="streets", crs="EPSG:32635")
     assert (houses.geom_type.tolist(), streets.geom_type.tolist()) == (["Polygon"], ["LineString"])
     notes: list[str] = []
-    read_surroundings(path, role="buildings", crs="EPSG:32635", tell=notes.append)
+    read_surroundings(path, role="buildings", crs="EPSG:32635", remark=notes.append)
     why = "unreadable: is not closed, as the outline of a building is (1)"
     assert notes == [f"{path}: {why}"]
     lines = tuple(
