@@ -332,7 +332,9 @@ class Localize(SearchOptions, QueryOptions):
             try:
                 if isinstance(line.query, InputError):
                     raise line.query
-                own = locator.of(line.query) if isinstance(locator, UsualLocator) else locator
+                own = locator
+                if isinstance(locator, UsualLocator):
+                    own = locator.of(line.query, in_words=line.in_words)
                 own = self.with_unplaced(own, line.query, line.unplaced, line.absent)
                 return line, {**own.locate(line.query).to_dict()}
             except (EmptyResultError, InputError, UnknownNameError) as error:

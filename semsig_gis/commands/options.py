@@ -351,12 +351,12 @@ class QueryOptions:
         return self._seen(dataset)[0]
 
     def usual_noise(self, query: View, taxonomy: Taxonomy) -> str:
-        """Return the default noise: "by-hand" for a view in words, since people leave out much."""
+        """Return the default noise for a query, which may be in words."""
         from semsig_gis.localization import usual_noise
         from semsig_gis.observation import text_row
 
-        in_words = self.seen and self.types is None and "see" in text_row(self.seen, taxonomy)
-        return "by-hand" if in_words else usual_noise(query)
+        text = self.seen if self.types is None else None
+        return usual_noise(query, in_words=bool(text) and "see" in text_row(text or "", taxonomy))
 
     def unplaced(
         self, dataset: SignatureDatabase | PartitionedDatabase

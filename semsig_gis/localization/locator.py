@@ -187,12 +187,15 @@ def make_locator(
     return LikelihoodLocator(index=index or method_index(database, method), **options)
 
 
-def usual_noise(view: Signature) -> str:
+def usual_noise(view: Signature, *, in_words: bool = False) -> str:
     """Return the name of the noise model for a view if none is given.
 
-    It is ``photo`` for a view of photographs or sectors, ``panorama`` for a full turn with scores
-    of a detector, and otherwise ``generic``.
+    It is ``by-hand`` for a view in words, since people leave out much, ``photo`` for a view of
+    photographs or sectors, ``panorama`` for a full turn with scores of a detector, and otherwise
+    ``generic``.
     """
+    if in_words:
+        return "by-hand"
     if not isinstance(view, View):
         return "generic"
     if any(photo.sectors for photo in view.photos):
@@ -210,9 +213,9 @@ class UsualLocator:
     make: Callable[[str], LikelihoodLocator]
     _locators: dict[str, LikelihoodLocator] = field(default_factory=dict, init=False)
 
-    def of(self, view: Signature) -> LikelihoodLocator:
+    def of(self, view: Signature, *, in_words: bool = False) -> LikelihoodLocator:
         """Return the locator for a view."""
-        name = usual_noise(view)
+        name = usual_noise(view, in_words=in_words)
         if name not in self._locators:
             self._locators[name] = self.make(name)
         return self._locators[name]
@@ -399,7 +402,7 @@ def localize_many(
 
     def answer(item: AnyView) -> Location | Localization:
         description = read_description(item, taxonomy=dataset.taxonomy, radius=dataset.spec.radius)
-        noise = "by-hand" if description.in_words else usual_noise(description.view)
+        noise = usual_noise(description.view, in_words=description.in_words)
         locator = locator_for(noise if usual else "")
         unplaced, absent = description.unplaced, description.absent
         if unplaced or absent:

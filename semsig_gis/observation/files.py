@@ -37,7 +37,8 @@ class QueryLine:
     """A line of a file of queries: a query, possibly without objects, or an error.
 
     `name` is its ``id``, otherwise the line number. `unplaced` and `absent` are the class codes of
-    objects in its sentence that were seen in an unknown direction, and that are not in sight.
+    objects in its sentence that were seen in an unknown direction, and that are not in sight;
+    `in_words` is whether it has a sentence.
     """
 
     line: int
@@ -45,6 +46,7 @@ class QueryLine:
     query: View | InputError
     unplaced: Codes = ()
     absent: Codes = ()
+    in_words: bool = False
 
 
 def read_queries(
@@ -79,7 +81,14 @@ def _query_lines(
             yield QueryLine(line=line, name=name, query=result)
         else:
             query, unplaced, absent = result
-            yield QueryLine(line=line, name=name, query=query, unplaced=unplaced, absent=absent)
+            yield QueryLine(
+                line=line,
+                name=name,
+                query=query,
+                unplaced=unplaced,
+                absent=absent,
+                in_words=row_value(row, "see") is not None,
+            )
 
 
 def read_route(

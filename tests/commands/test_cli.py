@@ -23,6 +23,7 @@ from servers import Answer, Server
 
 from semsig_gis import __version__
 from semsig_gis.database import open_database
+from semsig_gis.localization import localize
 
 if TYPE_CHECKING:
     from conftest import Run, RunOk
@@ -451,6 +452,17 @@ def test_sentence_is_printed_as_understood(run_ok: RunOk, method: str) -> None:
     )
     assert again["query"] == view
     assert again["candidates"] == answer["candidates"]
+
+
+def test_sentence_has_one_answer_whoever_reads_it(city: Path, run_ok: RunOk) -> None:
+    words = "lamp at 80 within 12 m, crossing at 120 far, street light at 200"
+    single = json.loads(run_ok("localize city.parquet --json", words))
+    (city / "queries.jsonl").write_text(json.dumps({"see": words}))
+    (line,) = run_ok("localize city.parquet --queries queries.jsonl").splitlines()
+    assert single["noise"] == json.loads(line)["noise"] == "by-hand"
+    assert json.loads(line)["candidates"] == single["candidates"]
+    answer = localize(city / "city.parquet", words, explained=0)
+    assert answer.to_dict()["place"] == single["place"]
 
 
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])

@@ -64,3 +64,4 @@ def test_usual_noise_depends_on_the_view(photo: Photo, scores: bool, name: str) 
     if scores:
         view = View(None, view.bearings, photos=(photo,), scores=view.class_scores())
     assert usual_noise(view) == name
+    assert usual_noise(view, in_words=True) == "by-hand"
