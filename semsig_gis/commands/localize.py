@@ -272,9 +272,12 @@ class Localize(SearchOptions, QueryOptions):
                 north=north,
             )
 
+        # The map shows the objects of the best place, too.
+        explain = self.explain or self.map is not None
+
         def make(noise: str) -> LikelihoodLocator:
             return self.locator(
-                city, reporter, north, usual_noise=noise, top=self.top, explain=self.explain
+                city, reporter, north, usual_noise=noise, top=self.top, explain=explain
             )
 
         if query is not None:
@@ -361,11 +364,13 @@ class Localize(SearchOptions, QueryOptions):
             answer = locator.locate(query)
         notes: list[str] = []
         if self.map is not None:
+            from semsig_gis.localization import Location
             from semsig_gis.output import localization_map, location_map, save_map
 
             with reporter.progress("drawing the map"):
-                if self.ranking == LIKELIHOOD:
+                if isinstance(answer, Location):
                     map_ = location_map(answer)
+                    answer = answer if self.explain else replace(answer, explanations=())
                 else:
                     map_ = localization_map(answer, city.database)
                 draw_ground(map_, city)

@@ -748,7 +748,15 @@ def draw_ground(
 
 
 def online_notes(offline: bool, *, tiles: str | None = None) -> list[str]:  # noqa: FBT001
-    """Return a note if a map needs a network."""
+    """Return notes on a map that needs a network, or a web server for its tiles."""
+    from semsig_gis.output import needs_server
+
     what = "Leaflet" if tiles is None else "its tiles"
     note = f"the map takes {what} from the web, so it needs a network to be displayed"
-    return [] if offline else [note]
+    notes = [] if offline else [note]
+    if tiles is not None and needs_server(tiles):
+        notes.append(
+            f"the provider of {tiles} refuses its tiles to pages that are opened from disk; put "
+            "the map on a web server, or give another provider, such as --tiles CyclOSM"
+        )
+    return notes

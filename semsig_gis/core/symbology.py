@@ -149,7 +149,8 @@ ANSWERS: Mapping[str, Mark] = MappingProxyType(
 ERROR_BREAKS = (5, 10, 25, 50, 100)
 """Limits of the error classes on maps and in tables, in metres."""
 
-# The first colour is visible on light and dark grounds; the others get steadily darker.
+# How well something can be found has the same colours on all maps: well is bright, badly is dark.
+# All are visible on light and dark grounds, and get steadily darker.
 FAILURES: Mapping[float, str] = MappingProxyType(
     {
         0.0: "#fac712",
@@ -162,23 +163,27 @@ FAILURES: Mapping[float, str] = MappingProxyType(
 )
 """Colour of a place by the minimum share of failed queries around it."""
 
+GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
+    dict(zip((1, 2, 10, 100, 1_000, 10_000), FAILURES.values(), strict=True))
+)
+"""Colour of a cell by the minimum number of cells with its signature, itself included."""
+
 RANK_RAMP = ("#fde0dd", "#fa9fb5", "#dd3497", "#7a0177")
 """Colours of the places of an answer; the best is darkest."""
 
 CANDIDATE_RAMP = ("#31688e", "#35b779", "#fde725")  # all visible on a dark ground
 
-# Lightness increases steadily.
 FOUND_RAMP = (
-    "#344d35",
-    "#455631",
-    "#56612f",
-    "#686c2e",
-    "#7b7a2f",
-    "#8f8833",
-    "#a59839",
-    "#bdaa43",
-    "#d7bd50",
-    "#f3d260",
+    "#853b02",
+    "#92480b",
+    "#a05613",
+    "#ac6419",
+    "#b9721e",
+    "#c68222",
+    "#d39223",
+    "#dfa322",
+    "#edb51b",
+    "#fac712",
 )
 """Colour of a cell by tenths of the probability to be found."""
 
@@ -206,20 +211,7 @@ VERDICTS: Mapping[str, str] = MappingProxyType(
 )
 """Colour of an object by the result of matching it with a query."""
 
-GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
-    {
-        1: "#fcc5ad",
-        2: "#fb9d7c",
-        10: "#f0694b",
-        100: "#d5302a",
-        1_000: "#a81016",
-        10_000: "#6b000c",
-    }
-)
-"""Colour of a cell by the minimum number of cells with its signature, itself included."""
-
-
-SAME_TYPES, SAME_LEVELS = "#f5f5ff", "#ffd43b"
+SAME_TYPES, SAME_LEVELS = "#f5f5ff", "#7dffd0"
 """Colours of cells with the same types, and with the same types and angle levels."""
 
 DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(

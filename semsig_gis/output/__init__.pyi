@@ -82,6 +82,7 @@ from .html.page_elements import data_url as data_url
 from .html.page_elements import exact_latlon as exact_latlon
 from .html.page_elements import layers_of as layers_of
 from .html.page_elements import mark_svg as mark_svg
+from .html.page_elements import needs_server as needs_server
 from .html.page_elements import page_element as page_element
 from .html.page_elements import panel_signs as panel_signs
 from .html.page_elements import search_area as search_area

@@ -112,6 +112,7 @@ DARK = np.concatenate(
 )
 SAME, *CHANGES = DRIFT_COLOURS.values()
 FIELD = rgb([*FAILURES.values()])
+FOUND = [*FAILURES.values(), *FOUND_RAMP]
 RAYS = ("matched", "misnamed", "false")  # the others are thin, grey and dashed on purpose
 # What can lie on what, and next to it.
 PAIRS = {
@@ -123,19 +124,19 @@ PAIRS = {
     "outcomes, field": (rgb(MARKS), FIELD),
     **{
         f"{what}, {name}": (ones, others)
-        for name, colours in (
-            ("cells with equal signatures", [*GROUP_COLOURS.values()]),
-            ("cells found", [*FOUND_RAMP]),
-            ("cells that differ", CHANGES),
+        for name, colours, in_the_dark in (
+            ("cells found", FOUND, rgb(FOUND)),
+            ("cells that differ", CHANGES, lifted(CHANGES)),
         )
         for what, ones, others in (
             ("outcomes", rgb(MARKS), rgb(colours)),
-            ("outcomes in the dark", rgb(MARKS), lifted(colours)),
+            ("outcomes in the dark", rgb(MARKS), in_the_dark),
             ("light paper", rgb([LIGHT_PAPER]), rgb(colours)),
-            ("dark paper", rgb([DARK_PAPER]), lifted(colours)),
-            ("what is pointed at", rgb([POINTED]), np.concatenate([rgb(colours), lifted(colours)])),
+            ("dark paper", rgb([DARK_PAPER]), in_the_dark),
+            ("what is pointed at", rgb([POINTED]), np.concatenate([rgb(colours), in_the_dark])),
         )
     },
+    "cells that look the same": (rgb([SAME_TYPES, SAME_LEVELS]), rgb([*GROUP_COLOURS.values()])),
     "what is pointed at": (rgb([POINTED]), np.concatenate([LIGHT, DARK, FIELD, rgb(MARKS)])),
     "answers": (rgb(ANSWER_MARKS[:1]), rgb(ANSWER_MARKS[1:])),
     "answers, ground": (rgb(ANSWER_MARKS), np.concatenate([LIGHT, DARK])),
@@ -203,9 +204,9 @@ def test_object_signs_contrast_with_the_ground_by_fill_or_edge(sight: str) -> No
 def meanings() -> list[str]:
     """Return what the tables of signs draw anything with, but the classes."""
     tables = (
-        *([POINTED], MARKS, ANSWER_MARKS, FAILURES.values()),
-        *(RANK_RAMP, CANDIDATE_RAMP, FOUND_RAMP, SHADES.values(), CELL_CHANCES.values()),
-        *(CHANCES.values(), VERDICTS.values(), GROUP_COLOURS.values(), DRIFT_COLOURS.values()),
+        *([POINTED], MARKS, ANSWER_MARKS, {*FOUND, *GROUP_COLOURS.values()}),
+        *(RANK_RAMP, CANDIDATE_RAMP, SHADES.values(), CELL_CHANCES.values()),
+        *(CHANCES.values(), VERDICTS.values(), DRIFT_COLOURS.values()),
         *(OBJECT_COLOURS.values(), [SAME_TYPES, SAME_LEVELS]),
     )
     return [*itertools.chain(*tables)]
@@ -239,6 +240,14 @@ def test_web_and_qgis_use_the_same_colours() -> None:
     assert AMBIGUITY.labels == labels
     assert AMBIGUITY.colours == tuple(GROUP_COLOURS.values())
     assert IDENTIFIABILITY.colours == FOUND_RAMP
+
+
+def test_well_found_is_the_bright_end_of_the_same_ramp_on_every_map() -> None:
+    assert [*FAILURES.values()] == [*GROUP_COLOURS.values()]
+    assert FOUND_RAMP[-1] == FAILURES[0.0]
+    assert FOUND_RAMP[0] == FAILURES[0.9]
+    for colours in (FOUND_RAMP, [*FAILURES.values()][::-1]):
+        assert np.all(np.diff([luminance(colour) for colour in colours]) > 0.0)
 
 
 # --- Signs of classes ---------------------------------------------------------------------------

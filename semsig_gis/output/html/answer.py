@@ -20,10 +20,12 @@ from semsig_gis.core import (
     InputError,
     mixed,
     percent,
+    place_links,
 )
 from semsig_gis.database import require_same_place, rows_of_result
 from semsig_gis.localization import DEFAULT_RULE
 from semsig_gis.localization import VERDICTS as COUNTED
+from semsig_gis.observation import View
 from semsig_gis.output.html.drawing import (
     REGION_COLOURS,
     answer_drawing,
@@ -48,25 +50,24 @@ from semsig_gis.output.html.page_elements import (
     folded_part,
     layer_part,
     mark_svg,
-    method_text,
     panel_signs,
     query_signature,
     ramp_bar,
     ranks_text,
     shades_part,
     start_map,
+    subtitle_part,
     swatch,
     ties_text,
     to_latlon,
 )
 from semsig_gis.output.layers.answer import (
     CANDIDATE_FORM,
-    OBJECT_FORM,
     PLACE_FORM,
-    RAYS,
     REGION_FORM,
     place_row,
 )
+from semsig_gis.output.layers.columns import described
 from semsig_gis.output.tables.answer import (
     north_sentences,
     note_sentences,
@@ -77,7 +78,7 @@ from semsig_gis.output.tables.answer import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     import folium
     from numpy.typing import NDArray
@@ -99,11 +100,19 @@ PLACE_NAMES = (
 CANDIDATE_NAMES = ("chance", "cell_chance", "distance", "loglik", "heading", "cell_id")
 REGION_NAMES = ("chance", "cells", "km2", "best_cell_id")
 LISTED_NAMES = ("chance", "distance", "types", "cell_id")
-OBJECT_NAMES = tuple(column.name for column in OBJECT_FORM["Object"][2:])
+SAID = {
+    "matched": "said, and there",
+    "misnamed": "said, but of another class",
+    "missed": "there, but not said",
+    "false": "said, but not there",
+    "outside": "there, but outside the photos",
+}
+"""Meaning of each verdict for people."""
+ORDER = ("matched", "misnamed", "false", "missed")  # of the objects in the panel
 REGION = {"color": CHANCES[0.9], "weight": 3, "opacity": 0.9, "fill": True, "fillOpacity": 0.25}
 CANDIDATE = "#ffffff"
 SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
-SURROUNDINGS_M = 45.0  # smallest distance that is shown around the answer
+SURROUNDINGS_M = 15.0  # smallest distance that is shown around the answer
 CLOSEST_ZOOM = 20
 
 
@@ -137,21 +146,106 @@ def location_map(
     """
     database, drawing = location.posterior.database, answer_drawing(location)
     page = start_map(map_, tiles, title="Where it was seen")
-    near = location.answer.given
-    _colour_chances(page, location.posterior, radius=location.rule.radius, near=near)
-    explained = zip(location.explanations, drawing["candidates"], strict=False)
-    for number, (explanation, candidate) in enumerate(explained, start=1):
-        sectors = sector_outlines(location, explanation)
-        parts = _object_parts(candidate["rays"], {*explanation.counts}, sectors)
-        name = f"Objects from rank {number}"
-        add_layer(page, name, "drawings", parts, group="answer", show=number == 1)
+    given = location.answer.given
+    _colour_chances(page, location.posterior, radius=location.rule.radius, near=given)
     cells = location.columns["cell"].tolist()
     looks = [(CANDIDATE, 8, f"Rank {rank:,}", str(rank)) for rank in range(1, len(cells) + 1)]
-    _add_candidates(page, location, database, cells, looks)
-    place = _place_parts(location, drawing["estimate"])
+    # Around an answer they would hide its objects.
+    _add_candidates(page, location, database, cells, looks, show=not given)
+    signs = panel_signs(database)
+    explained = max(1, len(location.explanations))
+    for rank, candidate in enumerate(drawing["candidates"][:explained], start=1):
+        about = _compared(location, candidate, rank)
+        parts: list[list[Any]] = [["answerObjects", about, signs]]
+        if rank <= len(location.explanations):
+            sectors = sector_outlines(location, location.explanations[rank - 1])
+            parts.append(["lines", [[SECTOR, sectors]]])
+        name = f"Objects from rank {rank}"
+        add_layer(page, name, "drawings", parts, group="answer", show=rank == 1)
+    mark = ANSWERS["given" if given else "withheld"]
+    outline = {"color": mark.colour, "weight": 3, "opacity": 0.9}
+    place = [
+        ["lines", [[outline, [drawing["estimate"]["ellipse"]]]]],
+        ["answerMark", drawing["estimate"]["place"], OUTLINES[mark.shape], mark.colour],
+    ]
     add_layer(page, "Best place", "drawings", place, group="answer")
-    legend, view = location_legend(location), _corners(location) if map_ is None else None
-    return finish_map(page, database, legend=legend, view=view, zoom=CLOSEST_ZOOM)
+    return finish_map(
+        page,
+        database,
+        legend=location_legend(location),
+        view=_corners(location) if map_ is None else None,
+        zoom=CLOSEST_ZOOM,
+        first="answer:1" if map_ is None else None,
+    )
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> dict[str, Any]:
+    """Return what was said and what is there at a candidate, for the script."""
+    symbols = {item.name: item.symbol for item in location.taxonomy.classes}
+    north, query = location.north, View.of(location.query)
+
+    def part(name: str | None, bearing: float | None, metres: float | None) -> Any:  # noqa: ANN401 - as JSON has it
+        """Return the class of an object, and its bearing and distance as a text."""
+        if name is None:
+            return None
+        turn = None if bearing is None else f"{north.from_grid(bearing):.0f}°"
+        text = ", ".join(filter(None, (turn, metres and f"{metres:.0f} m")))
+        return {"symbol": symbols.get(name, "?"), "text": text}
+
+    rays = [
+        {
+            **{name: row[name] for name in ("verdict", "to", "sign")},
+            "said": part(row["seen_class"], row["seen_bearing"], row["seen_range"]),
+            "there": part(row["object_class"], row["bearing"], row["distance"]),
+        }
+        for row in candidate["rays"]
+        if row["verdict"] in COUNTED
+    ]
+    # Objects of classes that the map does not have are no part of an explanation.
+    compared = {row["query"] for row in candidate["rays"]}
+    codes = [] if query.codes is None else query.codes.tolist()
+    rest = [code for number, code in enumerate(codes) if number not in compared]
+    seen = location.posterior.database.signature(candidate["cell"]).codes
+    words = location.taxonomy.words
+    there = "none on this map" if rays else words(seen)
+    more = [[words(rest), there]] if rest else []
+    lat, lon = candidate["rays"][0]["from"] if candidate["rays"] else candidate["place"]
+    best = exact_latlon(location.xy, location.crs)[0] if rank == 1 else [lat, lon]
+    given = location.answer.given
+    title = ("Found" if given else "Cannot tell: the best guess") if rank == 1 else f"Rank {rank}"
+    chance = location.answer.mass if rank == 1 else candidate["chance"]
+    xy = location.xy if rank == 1 else (candidate["x"], candidate["y"])
+    where = "" if location.place_name is None else location.place_name(*xy)
+    radius = f"within {location.rule.radius:g} m of this place"
+    lines = [
+        *([_capital(where)] if where else []),
+        f"Chance {percent(chance)} {radius}",
+        f"{best[0]:.6f}, {best[1]:.6f} (latitude, longitude)",
+        *([location.doubt] if location.doubt and rank == 1 else []),
+    ]
+    form, names, row = (
+        (PLACE_FORM, PLACE_NAMES, place_row(location))
+        if rank == 1
+        else (CANDIDATE_FORM, CANDIDATE_NAMES, candidate)
+    )
+    columns = described(names, form, {})
+    facts = [[column.title, column.text(row.get(column.name))] for column in columns]
+    return {
+        "rank": rank,
+        "place": [lat, lon],
+        "best": best,
+        "title": title,
+        "where": bool(where),
+        "lines": lines,
+        "links": place_links(*best),
+        "rays": sorted(rays, key=lambda ray: ORDER.index(ray["verdict"])),
+        "more": more,
+        "facts": [fact for fact in facts if fact[1] is not None],
+    }
 
 
 def posterior_map(
@@ -214,7 +308,7 @@ def posterior_map(
 
 def _colour_chances(map_: folium.Map, posterior: Posterior, *, radius: float, near: bool) -> None:
     """Add images of chances and regions; show chances of cells if `near`, else within a radius."""
-    city = add_city(map_, posterior.database)
+    add_city(map_, posterior.database)
     around, cell = posterior.mass_within(radius), posterior.chances
     regions = _image(posterior, region_levels(posterior), REGION_COLOURS)
     for name, picture, show in (
@@ -222,8 +316,8 @@ def _colour_chances(map_: folium.Map, posterior: Posterior, *, radius: float, ne
         ("Chance of a cell", _chances(posterior, cell), near),
         ("Regions of 50, 90 and 99 %", regions, False),
     ):
-        image = cell_image(map_, *picture, dark="flip", opacity=0.85)
-        colour_cells(map_, name, city, image, show=show)
+        image = cell_image(map_, *picture, dark="flip", opacity=0.45)
+        colour_cells(map_, name, image, show=show)
 
 
 def _chances(posterior: Posterior, chances: NDArray[np.float64]) -> Image:
@@ -242,47 +336,20 @@ def _corners(location: Location) -> NDArray[np.float64]:
     """Return the corners of the first view: around the answer, or all candidates without one."""
     place = location.estimate
     middle = np.array([[place.x, place.y]])
-    if location.answer.given:
-        around = max(SURROUNDINGS_M, 1.5 * place.ellipse()[0])
-        corners = np.concatenate([middle - around, middle + around])
-    else:
-        corners = np.concatenate([middle, _viewpoints(location)])
-    return to_latlon(corners, location.crs)
+    if not location.answer.given:
+        return to_latlon(np.concatenate([middle, _viewpoints(location)]), location.crs)
+    rows = location.explanations[0].rows if location.explanations else ()
+    signs = [row["place"] for row in rows if row["place"]]
+    around = max(SURROUNDINGS_M, 1.5 * place.ellipse()[0])
+    corners = np.concatenate([middle - around, middle + around, np.array(signs).reshape(-1, 2)])
+    margin = 0.1 * np.ptp(corners, axis=0)
+    ends = np.stack([corners.min(axis=0) - margin, corners.max(axis=0) + margin])
+    return to_latlon(ends, location.crs)
 
 
 def _viewpoints(answer: Answer) -> NDArray[np.float64]:
     """Return the viewpoints of the candidates in metres, shape (n, 2)."""
     return np.stack([answer.columns["x"], answer.columns["y"]], axis=1)
-
-
-def _place_parts(location: Location, estimate: Mapping[str, Any]) -> list[list[Any]]:
-    """Return the drawing of the best place and its ellipse."""
-    row = place_row(location) | {"place": estimate["place"]}
-    name = "The answer" if location.answer.given else "Cannot tell: the best place"
-    mark = ANSWERS[row["answer"]]
-    outline = {"color": mark.colour, "weight": 3, "opacity": 0.9}
-    looks, shape = [(mark.colour, 6, name)], OUTLINES[mark.shape]
-    return [
-        ["lines", [[outline, [estimate["ellipse"]]]]],
-        described_points([row], PLACE_FORM, PLACE_NAMES, looks, outline=shape),
-    ]
-
-
-def _object_parts(
-    rays: Sequence[Mapping[str, Any]], counted: Collection[str], sectors: list[list[list[float]]]
-) -> list[list[Any]]:
-    """Return the drawing of the rays of a candidate, the street objects and the photo sectors."""
-    lines: list[list[Any]] = []
-    for verdict, (_, look) in RAYS.items():
-        ends = [[ray["from"], ray["to"]] for ray in rays if ray["verdict"] == verdict]
-        if ends or verdict in counted:
-            lines.append([{"color": VERDICTS[verdict], **look}, ends])
-    if sectors:
-        lines.append([SECTOR, sectors])
-    # The signs keep their order: that of the query, then that of the other street objects.
-    rows = [{**ray, "place": ray["sign"]} for ray in reversed(rays)]
-    looks = [(VERDICTS[row["verdict"]], 6, row["verdict"].capitalize()) for row in rows]
-    return [["lines", lines], described_points(rows, OBJECT_FORM, OBJECT_NAMES, looks)]
 
 
 def _add_candidates(
@@ -291,6 +358,8 @@ def _add_candidates(
     database: SignatureDatabase,
     cells: Sequence[int],
     looks: Sequence[Sequence[Any]],
+    *,
+    show: bool = True,
 ) -> None:
     """Add the candidates; `cells` are their rows in the database."""
     query, spec = answer.grid_query, database.spec
@@ -315,7 +384,7 @@ def _add_candidates(
         wheels=[("Query", queries), ("Cell sees", cell_views)],
         signs=panel_signs(database),
     )
-    add_layer(map_, f"Candidates ({len(rows):,})", *points, group="answer")
+    add_layer(map_, f"Candidates ({len(rows):,})", *points, group="answer", show=show)
 
 
 def location_legend(location: Location) -> str:
@@ -326,25 +395,27 @@ def location_legend(location: Location) -> str:
     verdicts = {row["verdict"] for item in location.explanations for row in item.rows}
     kinds = "".join(
         f"<br>{swatch(VERDICTS[kind])}{kind}: {text}"
-        for kind, (text, _) in RAYS.items()
+        for kind, text in SAID.items()
         if kind in verdicts or kind in COUNTED
     )
-    rays = f"<p>Objects of the query, as rays where they were seen{kinds}</p>"
+    rays = f"<p>Objects, and in which direction they were seen{kinds}</p>"
     name = "The answer" if location.answer.given else "The best place"
     method = f"Likelihood, {escaped_text(location.noise)} noise, {len(posterior.database):,} cells"
+    where = subtitle_part(escaped_text(_capital(location.place))) if location.place else ""
     return _answer_legend(
         location,
         "Where it was seen",
-        f"<p>{mark_svg(mark)} <b>{name}</b>, ellipse: 90 %<br>{method_text(method)}</p>",
+        f"<p>{mark_svg(mark)} <b>{name}</b>, ellipse: 90 %<br>{where}</p>",
         (*place_sentences(location), *position_sentences(location)),
         f"{_chances_legend(posterior)}"
         f"{layer_part('Candidates', f'<p>{swatch(CANDIDATE)}Candidates by rank</p>')}"
         f"{layer_part('Objects from rank ', rays) if location.explanations else ''}",
+        method=method,
     )
 
 
 def _answer_legend(
-    answer: Answer, title: str, head: str, sentences: Sequence[str], parts: str
+    answer: Answer, title: str, head: str, sentences: Sequence[str], parts: str, *, method: str
 ) -> str:
     """Return a legend as HTML: sentences on the answer, parts for its layers, and its query."""
     notes = (*north_sentences(answer), *note_sentences(answer))
@@ -354,7 +425,8 @@ def _answer_legend(
     query = "<br>".join(map(escaped_text, query_sentences(answer)))
     return (
         f"<summary>{title}</summary>{head}{texts}{parts}{shades_part()}"
-        f"{folded_part('The query', f'<p>{query}</p>')}{credits_part(answer.licenses)}"
+        f"{folded_part('The query', f'<p>{query}<br>Method: {method}</p>')}"
+        f"{credits_part(answer.licenses)}"
     )
 
 
@@ -438,10 +510,10 @@ def localization_legend(localization: Localization) -> str:
     return _answer_legend(
         localization,
         "Candidate places",
-        f"<p>The best <b>{len(distances):,}</b> of {localization.cells:,} cells<br>"
-        f"{method_text(method)}</p>",
+        f"<p>The best <b>{len(distances):,}</b> of {localization.cells:,} cells</p>",
         tuple(tie_sentences(localization)),
         layer_part("Candidates", f"<p>Distance to the query (large sign: rank 1){ramp}</p>"),
+        method=method,
     )
 
 

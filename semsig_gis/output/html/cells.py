@@ -28,7 +28,6 @@ from semsig_gis.output.html.image import (
     steps,
 )
 from semsig_gis.output.html.page_elements import (
-    LIFTING,
     NAMED_CLASSES,
     PAGE_FILES,
     ScriptLayer,
@@ -41,7 +40,6 @@ from semsig_gis.output.html.page_elements import (
     folded_part,
     layer_part,
     layers_of,
-    method_text,
     panel_signs,
     ramp_bar,
     start_map,
@@ -261,7 +259,7 @@ def ambiguity_map(
     for name, size in sizes.items():
         image = pixels.image(pixels.levels(AMBIGUITY.levels(size)), AMBIGUITY.colours)
         show = name == "Same types"
-        colour_cells(page, name, cell_image(page, *image, dark="lift"), show=show)
+        colour_cells(page, name, cell_image(page, *image, dark="keep"), show=show)
     more = [] if identifiability is None else [_lookalike_facts(identifiability)]
     add_cells(page, database, [_group_facts(database), *more])
     legend = ambiguity_legend(sizes, licenses=database.licenses)
@@ -300,7 +298,7 @@ def identifiability_map(
     page = start_map(map_, tiles, title="Where a query can be placed")
     levels = IDENTIFIABILITY.levels(identifiability.found)
     image = level_image(database, levels, IDENTIFIABILITY.colours)
-    colour_cells(page, "Chance to be found", cell_image(page, *image, dark="lift"))
+    colour_cells(page, "Chance to be found", cell_image(page, *image, dark="keep"))
     add_cells(page, database, [_group_facts(database), _lookalike_facts(identifiability)])
     legend = identifiability_legend(identifiability)
     return finish_map(page, database, legend=legend, view=view if map_ is None else None)
@@ -359,7 +357,7 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
             size
         )
         rows = "".join(
-            f"<tr><td>{swatch(colour, LIFTING)}{label}</td>"
+            f"<tr><td>{swatch(colour, 'square')}{label}</td>"
             f"<td class='count'>{percent(share, 1)}</td></tr>"
             for (_, _, label, colour), share in zip(AMBIGUITY.ranges, shares[1:], strict=True)
         )
@@ -391,7 +389,7 @@ def identifiability_legend(identifiability: Identifiability) -> str:
         f"<td>{100 * item['chance_near']:+.1f} %</td></tr>"
         for item in facts["classes"][:NAMED_CLASSES]
     )
-    bar = ramp_bar(IDENTIFIABILITY.colours, "0 %", "100 %", sign="ramp semsig-lift")
+    bar = ramp_bar(IDENTIFIABILITY.colours, "0 %", "100 %")
     scale = f"<p>Chance to be found{bar}</p>"
     figures = (
         f"<p>{bands}</p><p>What each class adds to the chance {within}</p><table>{classes}</table>"
@@ -400,7 +398,7 @@ def identifiability_legend(identifiability: Identifiability) -> str:
         "<summary>Where a query can be placed</summary>"
         f"<p><b>{percent(facts['chance_found'], 1)}</b> chance to answer a {query} {within}<br>"
         f"Mean of {facts['cells']:,} cells, "
-        f"{method_text(escaped_text(facts['noise']) + ' noise')}<br>"
+        f"{escaped_text(facts['noise'])} noise<br>"
         "Click a cell to see what it is mistaken for</p>"
         f"{layer_part('Chance to be found', scale)}"
         f"{folded_part('Figures', figures)}{credits_part(identifiability.database.licenses)}"

@@ -115,7 +115,8 @@ def described_points(
             f"{lat:.6f}, {lon:.6f}",
         ]
         records.append([row["place"], colour, size, name, details, *label])
-    fields = [*(title for title, _ in wheels), *(column.title for column in columns), "Place"]
+    fields = [*(title for title, _ in wheels), *(column.title for column in columns)]
+    fields.append("Latitude, longitude")
     drawing = ["points", fields, signs or {}, records[::-1]]
     return drawing if outline is None else [*drawing, outline]
 

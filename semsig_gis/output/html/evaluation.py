@@ -32,7 +32,6 @@ from semsig_gis.output.html.page_elements import (
     layer_part,
     layers_of,
     mark_svg,
-    method_text,
     panel_signature,
     panel_signs,
     query_signature,
@@ -59,7 +58,7 @@ QUERY_FIELDS = (
     *(f"P(error ≤ {Evaluation.success_metres} m)", "True rank", "True cell"),
     *("Best cell", "Next best cells", "Best cell sees"),
 )
-FIELD_NAME = "Share of queries that fail"
+FIELD_NAME = "Share of queries found"
 KILOMETRE = 1000
 SHARE_STEPS = 250  # steps of a share in a byte, after 0 for no value
 WEIGHT_STEPS = 10  # steps of the weight of one query in a byte
@@ -125,8 +124,8 @@ def evaluation_map(
     field_layer = ScriptLayer(None, "field", *_packed_field(field, database), group="cells")
     field_layer.add_to(page)
     colour_cells(page, FIELD_NAME, city, field_layer)
-    _add_queries(page, evaluation, database, places, best_places)
-    legend = evaluation_legend(evaluation, radius=field.radius, licenses=database.licenses)
+    key = _add_queries(page, evaluation, database, places, best_places)
+    legend = evaluation_legend(evaluation, radius=field.radius, licenses=database.licenses, key=key)
     view = corners_of(database) if map_ is None else None
     return finish_map(page, database, legend=legend, view=view)
 
@@ -137,8 +136,8 @@ def _add_queries(
     database: SignatureDatabase,
     places: NDArray[np.float64],
     best_places: NDArray[np.float64],
-) -> None:
-    """Add layers of queries by outcome and of lines from true to best places, and add filters."""
+) -> str:
+    """Add layers of queries and of lines to their best places, and filters; return their key."""
     queries = evaluation.queries
     failed = ~evaluation.successful
     has_chances = evaluation.method.noise is not None
@@ -189,6 +188,7 @@ def _add_queries(
         add_layer(map_, title, "queryLayer", key, at, group="queries")
     title = "Lines from true to estimated places"
     add_layer(map_, title, "queryLayer", key, len(OUTCOMES), group="queries", show=False)
+    return key
 
 
 class _Queries(Call):
@@ -297,36 +297,50 @@ def _packed_field(
     return arrays, about
 
 
-def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequence[str]) -> str:
-    """Return the legend of `evaluation_map` as escaped HTML; `radius` is that of the field."""
+def evaluation_legend(
+    evaluation: Evaluation, *, radius: float, licenses: Sequence[str], key: str = "queries"
+) -> str:
+    """Return the legend of `evaluation_map` as escaped HTML; `radius` is that of the field.
+
+    The script changes the numbers of queries as the filters with this `key` are set.
+    """
     count, distortions = len(evaluation.queries), chain_text(evaluation.asked.distortions)
     successes = int(evaluation.successful.sum())
     best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"
     shares = "".join(
-        f"<tr><td>P(error ≤ {threshold} m)</td><td>{percent(share, 1)}</td></tr>"
+        f"<tr><td>within {threshold} m</td><td>{percent(share, 1)}</td></tr>"
         for threshold, share in zip(ERROR_BREAKS, evaluation.cdf(ERROR_BREAKS), strict=True)
     )
-    limits = [percent(low, 0) for low in FAILED.breaks[1:-1]]
+    how = (
+        f"<p>Method: {escape(method_words(evaluation.method))}, {best}<br>"
+        f"Distortion: {escaped_text(distortions or 'none')}</p>"
+    )
+    # As on the other maps, what is found well stands at the right.
+    limits = [percent(1.0 - failed, 0) for failed in FAILED.breaks[-2:0:-1]]
+    numbers = [
+        f'<span data-queries="{key}" data-outcome="{at}">{number:,}</span>'
+        for at, number in enumerate((successes, count - successes))
+    ]
     within = f"within {Evaluation.success_metres} m"
     successful = (
-        f"{mark_svg(OUTCOMES['successful'])} {successes:,} successful: {within} with probability "
+        f"{mark_svg(OUTCOMES['successful'])} {numbers[0]} successful: {within} with probability "
         f"{Evaluation.success_probability:g} or more<br>"
     )
-    failed = f"{mark_svg(OUTCOMES['failed'])} {count - successes:,} failed"
+    failed = f"{mark_svg(OUTCOMES['failed'])} {numbers[1]} failed"
     field = (
-        f"<p>Share of the queries within {radius:,g} m that failed, the nearer counting more"
-        f"{class_bar(FAILED.colours, limits)}"
+        f"<p>Share of the queries within {radius:,g} m that were found, the nearer counting more"
+        f"{class_bar(FAILED.colours[::-1], limits)}"
         f'<i class="hatched"></i>fewer than {ENOUGH_QUERIES:g} queries count</p>'
     )
     share = percent(evaluation.cdf([Evaluation.success_metres])[0], 1)
     return (
         "<summary>Localization errors</summary>"
         f"<p><b>{share}</b> of {count:,} queries "
-        f"{within}<br>{method_text(f'{escape(method_words(evaluation.method))}, {best}')}<br>"
-        f"Distortion: {escaped_text(distortions or 'none')}</p>"
+        f"{within}</p>"
+        f'<p class="semsig-selected" data-queries="{key}" hidden></p>'
         f"{layer_part('Successful queries', successful)}"
         f"{layer_part('Failed queries', failed)}"
         f"{layer_part(FIELD_NAME, field)}"
-        f"{shades_part()}{folded_part('Figures', f'<table>{shares}</table>')}"
+        f"{shades_part()}{folded_part('Figures', f'<table>{shares}</table>{how}')}"
         f"{credits_part(licenses)}"
     )

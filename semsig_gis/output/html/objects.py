@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING, Any
 
+import geopandas as gpd
 import numpy as np
 import pandas as pd
 import shapely
@@ -40,7 +42,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import folium
-    import geopandas as gpd
     from numpy.typing import NDArray
     from pyproj import CRS
 
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
 STREET_WIDTH_M = 6.0
 DETAIL_M = 0.6  # smaller details are not drawn
 POLYGONAL = 2
-FIELDS = ("Class", "Source", "Identifier", "Represents", "Also", "Place")
+FIELDS = ("Class", "Source", "Identifier", "Represents", "Also", "Latitude, longitude")
 
 
 def ground_map(
@@ -124,6 +125,8 @@ def packed_ground(
 
     EmptyResultError if no shape intersects the box.
     """
+    if "streets" in tables and NAME in tables["streets"]:
+        tables = {**tables, "streets": _joined(tables["streets"])}
     simple = {kind: _simple(table, box) for kind, table in tables.items()}
     shapes = {kind: parts for kind, (parts, _) in simple.items() if len(parts)}
     if not shapes:
@@ -139,6 +142,22 @@ def packed_ground(
         arrays["streets"]["called"] = steps(numbers.astype(np.int32))
     bounds = shapely.total_bounds(np.concatenate(list(shapes.values()))).reshape(2, 2)
     return arrays, about, bounds
+
+
+def _joined(streets: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """Return streets with the lines of each name joined, so that there is room for the name."""
+    named = (streets[NAME].notna() & (streets[NAME] != "")).to_numpy()
+    lines = (
+        streets.geometry[named]
+        .groupby(streets[NAME][named])
+        .agg(lambda group: shapely.line_merge(shapely.multilinestrings(shapely.get_parts(group))))
+    )
+    others = streets.geometry[~named]
+    return gpd.GeoDataFrame(
+        {NAME: [*lines.index, *[None] * len(others)]},
+        geometry=[*lines, *others],
+        crs=streets.crs,
+    )
 
 
 def _simple(
@@ -270,7 +289,7 @@ def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     ends = np.cumsum(list(counts.values())).tolist()
     classes = [
-        {**sign_look(signs[code]), "symbol": signs[code].symbol, "start": end - count, "end": end}
+        {**sign_look(signs[code]), "start": end - count, "end": end}
         for (code, count), end in zip(counts.items(), ends, strict=True)
     ]
     about |= {
@@ -291,6 +310,7 @@ def objects_legend(objects: StreetObjects) -> str:
     rows = "".join(
         f"<tr><td>{sign_svg(signs[code])}</td>"
         f"<td class='title'>{escaped_text(signs[code].title)}</td>"
+        f"<td><small>{escape(signs[code].symbol)}</small></td>"
         f'<td class="count">{count:,}</td></tr>'
         for code, count in counts.items()
     )

@@ -5,9 +5,11 @@ from __future__ import annotations
 import base64
 import functools
 import itertools
+import re
 from html import escape
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Literal, cast
+from urllib.parse import urlsplit
 
 import folium
 import numpy as np
@@ -52,6 +54,7 @@ VIEW_MARGIN = 0.05  # of the sides of that box
 PAGE_FILES = (
     *("page.css", "panel.css", "layers.js", "state.js", "panel.js", "wheels.js", "search.js"),
     *("controls.js", "picture.js", "arrays.js", "board.js", "field.js", "objects.js", "ground.js"),
+    "answer.js",
 )
 TILES_WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
 AREA_DEGREE = 4  # of the polynomial from x, y to degrees; exact to millimetres in a city
@@ -145,6 +148,8 @@ class LayerGroups(Call):
             for child in layers_of(map_).values()
             if isinstance(child, ScriptLayer) and child.control
         }
+        tiles = (child for child in layers_of(map_).values() if isinstance(child, folium.TileLayer))
+        groups |= {child.layer_name: "ground" for child in tiles}
         super().__init__("layerGroups", map_, layers, GROUPS, groups)
 
 
@@ -157,9 +162,10 @@ class PageControls(Call):
         layers: folium.LayerControl,
         area: dict[str, Any] | None,
         names: tuple[str, ...],
+        first: str | None,
     ) -> None:
-        super().__init__("addControls", map_, layers, area, names)
-        self.area, self.names = area, names
+        super().__init__("addControls", map_, layers, area, names, first)
+        self.area, self.names, self.first = area, names, first
 
 
 def start_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
@@ -170,13 +176,24 @@ def start_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> foli
                 f"Tiles {tiles!r} were given with a map of your own; add them to that map."
             )
         return map_
-    provider = None if tiles is None else _tile_provider(tiles)
-    new_map = folium.Map(tiles=provider, prefer_canvas=True, control_scale=True)
-    if provider is None:
+    new_map = folium.Map(tiles=None, prefer_canvas=True, control_scale=True)
+    if tiles is not None:
+        provider = _tile_provider(tiles)
+        name = provider["name"].removesuffix(".Mapnik").replace(".", " ")
+        folium.TileLayer(provider, name=f"Online map: {name}", overlay=True).add_to(new_map)
+    else:
         # Without tiles Leaflet has no maximum zoom; fractional zooms only blur tiles.
         new_map.options |= {"maxZoom": MAX_ZOOM, "zoomSnap": 0.25}
     cast("Figure", new_map.get_root()).title = title
     return new_map
+
+
+def needs_server(tiles: str) -> bool:
+    """Whether online tiles are refused to pages that are opened from disk.
+
+    Such pages do not say where they are from, which the policy of OpenStreetMap's server requires.
+    """
+    return urlsplit(_tile_provider(tiles).url).hostname == "tile.openstreetmap.org"
 
 
 def _tile_provider(name: str) -> xyzservices.TileProvider:
@@ -219,22 +236,26 @@ def finish_map(
     view: NDArray[np.float64] | None = None,
     zoom: int = FIRST_VIEW_ZOOM,
     licenses: tuple[str, ...] = (),
+    first: str | None = None,
 ) -> folium.Map:
     """Add the legend, the layer control and the other controls, after all layers.
 
     ``view`` holds places that the first view shows, at a zoom of at most ``zoom``; the search box
-    finds the cells and places of ``source``.
+    finds the cells and places of ``source``. ``first`` is the key of what the panel shows first,
+    such as ``answer:1``; the other boxes are folded then.
     """
     if legend:
         corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
         Call("legend", map_, legend, corners, zoom).add_to(map_)
     children = layers_of(map_)
     area = None if source is None else search_area(source)
-    names = (*(() if source is None else map(str, source.licenses)), *licenses)
+    lines = (*(() if source is None else map(str, source.licenses)), *licenses)
+    # The terms; the layers that they apply to are in the part on the data.
+    names = tuple(re.sub(r"(?<=\)): .*", "", line, flags=re.DOTALL) for line in lines)
     # A map that was finished before has these controls already: replace them.
     for name, child in list(children.items()):
         if isinstance(child, PageControls):
-            names = child.names + names
+            names, first = child.names + names, child.first or first
             if area is None or area["grid"] is None:
                 area = child.area or area
         if isinstance(child, folium.LayerControl | LayerGroups | PageControls):
@@ -244,7 +265,7 @@ def finish_map(
     layers = folium.LayerControl(collapsed=collapsed, autoZIndex=False)
     layers.add_to(map_)
     LayerGroups(map_, layers).add_to(map_)
-    PageControls(map_, layers, area, tuple(dict.fromkeys(names))).add_to(map_)
+    PageControls(map_, layers, area, tuple(dict.fromkeys(names)), first).add_to(map_)
     return map_
 
 
@@ -335,6 +356,7 @@ def sign_look(sign: ClassSign) -> dict[str, Any]:
         "ink": sign.ink,
         "outline": OUTLINES[sign.shape],
         "drop": sign.drop,
+        "pictogram": sign.pictogram,
     }
 
 
@@ -442,13 +464,13 @@ def cell_image(
     image: bytes,
     bounds: list[list[float]],
     *,
-    dark: Literal["flip", "lift"],
+    dark: Literal["flip", "lift", "keep"],
     opacity: float = 1.0,
 ) -> ImageOverlay:
     """Return a PNG as an overlay below all drawn layers, for `colour_cells`.
 
-    With dark colours, ``flip`` inverts shades that start near white, and ``lift`` brightens ramps
-    with a dark end.
+    With dark colours, ``flip`` inverts shades that start near white, ``lift`` brightens ramps with
+    a dark end, and ``keep`` changes nothing.
     """
     overlay = ImageOverlay(
         data_url(image),
@@ -504,13 +526,12 @@ VERDICT_SHAPES = {
 
 
 def sign_svg(sign: ClassSign) -> str:
-    """Return the sign of a class as SVG."""
+    """Return the sign of a class as SVG: its pictogram on a disc."""
     return (
-        '<svg class="semsig-sign" viewBox="-1.3 -1.3 2.6 2.6" aria-hidden="true">'
-        f'<path d="{OUTLINES[sign.shape]}" fill="{sign.colour}"/>'
-        f'<text y="{sign.drop + 0.42:.2f}" font-size="1.2" font-weight="700" '
-        f'font-family="system-ui,sans-serif" text-anchor="middle" fill="{sign.ink}">'
-        f"{sign.symbol}</text></svg>"
+        '<svg class="semsig-sign pictogram" viewBox="-1.1 -1.1 2.2 2.2" aria-hidden="true">'
+        f'<path d="{OUTLINES["circle"]}" fill="{sign.colour}"/>'
+        f'<path d="{sign.pictogram}" transform="scale(.085)translate(-8-8)" fill="{sign.ink}"/>'
+        "</svg>"
     )
 
 
@@ -532,11 +553,11 @@ def swatch(colour: str, shape: str = "round") -> str:
     return f'<i class="{shape}" style="background:{colour}"></i>'
 
 
-def ramp_bar(colours: Iterable[str], low: str, high: str, *, sign: str = "ramp") -> str:
+def ramp_bar(colours: Iterable[str], low: str, high: str) -> str:
     """Return a colour ramp with labels at both ends, as HTML."""
     gradient = f"linear-gradient(to right,{','.join(colours)})"
     return (
-        f'<i class="{sign}" style="background:{gradient}"></i>'
+        f'<i class="ramp" style="background:{gradient}"></i>'
         f'<span class="ends"><small>{low}</small><small>{high}</small></span>'
     )
 
@@ -573,9 +594,9 @@ def layer_part(layer: str, text: str) -> str:
     return f'<div data-layer="{escape(layer)}">{text}</div>'
 
 
-def method_text(method: str) -> str:
-    """Return the method of a result as HTML; the title of the map repeats it."""
-    return f'<span class="semsig-method">{method}</span>'
+def subtitle_part(text: str) -> str:
+    """Return a part of a legend that the title of the map repeats."""
+    return f'<span class="semsig-subtitle">{text}</span>'
 
 
 def folded_part(title: str, text: str) -> str:
@@ -587,4 +608,4 @@ def credits_part(licenses: Iterable[str]) -> str:
     """Return the credits and licences of the data, folded."""
     lines = [f"{escaped_text(line)}<br>" for line in licenses]
     lines.append(f"Made with semsig_gis {escape(__version__)}")
-    return folded_part("About the data", f"<p><small>{''.join(lines)}</small></p>")
+    return folded_part("About", f"<p><small>{''.join(lines)}</small></p>")

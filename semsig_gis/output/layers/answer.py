@@ -323,6 +323,7 @@ def explanation_rows(location: Location, explanation: Explanation) -> list[dict[
             "seen_title": titles.get(row["query_class"]),
             "seen_bearing": row["query_bearing"],
             "seen_range": row["query_range"],
+            "object_class": row["object_class"],
             "object_title": titles.get(row["object_class"]),
             "bearing": row["object_bearing"],
             "distance": row["distance"],

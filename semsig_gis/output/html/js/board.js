@@ -60,6 +60,15 @@ semsig.sprite = (radius, draw) => {
     colour: Uint32Array.from(solid, (at) => colours[at]),
   };
 };
+// Fills a pictogram on a disc around (0, 0) with a radius of 1.
+semsig.paintPictogram = (ctx, pictogram, ink) => {
+  ctx.save();
+  ctx.scale(0.085, 0.085);
+  ctx.translate(-8, -8);
+  ctx.fillStyle = ink;
+  ctx.fill(new Path2D(pictogram));
+  ctx.restore();
+};
 // The mean of two colours.
 semsig.halved = (first, second) =>
   (((first ^ second) & 0xfefefefe) >>> 1) + (first & second) >>> 0;

@@ -17,8 +17,8 @@ semsig.between = (lattice, [west, south, east, north], x, y) => {
 };
 // The cells of a page; a cell is its index in the packed arrays.
 semsig.City = class {
-  constructor(data, grid) {
-    Object.assign(this, {data, grid, count: data.rows.length});
+  constructor(data, grid, signs) {
+    Object.assign(this, {data, grid, signs, count: data.rows.length});
   }
   // Binary search for the first index from low to high for which a condition holds.
   static firstOf(low, high, holds) {
@@ -180,7 +180,7 @@ semsig.City = class {
 semsig.cellFacts = {};
 semsig.cells = (packed, grid, signs, names) => {
   const group = L.layerGroup();
-  const ready = semsig.arrays(packed).then((data) => new semsig.City(data, grid));
+  const ready = semsig.arrays(packed).then((data) => new semsig.City(data, grid, signs));
   const buttons = (city, map, box, jumps) => {
     // Below the title, so that they stay visible in a long panel.
     const lines = jumps.map(([label, goals]) => {
@@ -240,8 +240,8 @@ semsig.cells = (packed, grid, signs, names) => {
     });
     const rows = [
       ...(away ? [["Nearest cell", `${Math.round(away)} m from the click`]] : []),
-      ...parts.flatMap((part) => part.rows), ["Cell", city.id(cell)],
-      ["Latitude, longitude", city.coordinates(cell)]];
+      ...parts.flatMap((part) => part.rows), ["Latitude, longitude", city.coordinates(cell)],
+      ["Cell", city.id(cell)]];
     const title = parts.map((part) => part.title).filter(Boolean).pop();
     const others = lookalikes.map(([other, reason], at) => ({
       label: `${at + 1}: ${city.far(cell, other)} to the ${city.towards(cell, other)}`,

@@ -8,7 +8,8 @@ semsig.cellFacts.change = (city, cell) => {
   for (const symbol of after[0]) count[symbol] = (count[symbol] || 0) + 1;
   for (const symbol of before[0]) count[symbol] = (count[symbol] || 0) - 1;
   const differences = Object.entries(count).filter((entry) => entry[1] !== 0).map(
-    ([symbol, more]) => `${more > 0 ? "+" : "\u2212"}${Math.abs(more)}\u00a0${symbol}`);
+    ([symbol, more]) => `${more > 0 ? "+" : "\u2212"}${Math.abs(more)}\u00a0${
+      city.signs.classes[symbol].title.toLowerCase()}`);
   const shown = (signature) => (signature[0] ? signature : "nothing");
   return {title, kind: "dates", rows: [
     ["Before", shown(before)],

@@ -64,7 +64,7 @@ semsig.download = (name, blob) => {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 };
-// The title of the map and its method, and its accessible name.
+// The title of the map and its results, and its accessible name.
 semsig.title = (map) => {
   const container = map.getContainer();
   const texts = (selector) => [...new Set(
@@ -73,7 +73,7 @@ semsig.title = (map) => {
   const title = document.title || summaries[0] || "Map";
   const box = L.DomUtil.create("div", "semsig-title", container);
   semsig.text(box, "h1", title);
-  const more = [...summaries.filter((text) => text !== title), ...texts(".semsig-method")];
+  const more = [...summaries.filter((text) => text !== title), ...texts(".semsig-subtitle")];
   if (more.length) semsig.text(box, "p", more.join(" \u00b7 "));
   container.setAttribute("role", "main");
   container.setAttribute("aria-roledescription", "map");
@@ -128,7 +128,24 @@ semsig.folding = (map, layers) => {
   });
   fit();
 };
-semsig.addControls = (map, layers, area, credits) => {
+// Shows the first view, next to the boxes and the panel.
+semsig.fitView = (map) => {
+  if (!map.semsigView) return;
+  const {view, zoom} = map.semsigView;
+  const {panel, selection} = map.semsigPanel;
+  const open = selection !== null;
+  const sheet = open && semsig.isSheet(map, panel);
+  const [left, right] = semsig.margins(map, 500);
+  const tops = [...map.getContainer().querySelectorAll(".leaflet-top")];
+  map.fitBounds(view, {
+    paddingTopLeft: [left, sheet ? Math.max(...tops.map((box) => box.offsetHeight)) + 10 : 10],
+    paddingBottomRight: [
+      right + (open && !sheet ? panel.offsetWidth : 0), sheet ? panel.offsetHeight + 10 : 10],
+    maxZoom: zoom, animate: false,
+  });
+};
+semsig.addControls = (map, layers, area, credits, first) => {
+  map.attributionControl?.setPrefix(false);
   for (const credit of map.attributionControl ? credits : []) {
     // In an element of its own, so that its text direction does not change other text.
     const text = L.DomUtil.create("bdi", "");
@@ -144,12 +161,15 @@ semsig.addControls = (map, layers, area, credits) => {
   semsig.title(map);
   semsig.explain(map, layers);
   semsig.folding(map, layers);
-  if (map.semsigView) {
-    const {view, zoom} = map.semsigView;
-    const [left, right] = semsig.margins(map, 500);
-    map.fitBounds(view, {
-      paddingTopLeft: [left, 10], paddingBottomRight: [right, 10], maxZoom: zoom, animate: false,
-    });
+  semsig.fitView(map);
+  const state = semsig.state.read();
+  if (first && !state.has("told")) {
+    const [kind, key] = first.split(":");
+    for (const legend of map.getContainer().querySelectorAll(".semsig-legend")) legend.open = false;
+    layers.options.collapsed = true;
+    layers.remove().addTo(map);
+    semsig.openers[kind](map, key);
+    semsig.fitView(map);
   }
   semsig.rememberLayers(map, layers);
   semsig.rememberPlace(map);

@@ -28,7 +28,7 @@ semsig.rangeSlider = (parent, label, last, textOf, changed) => {
     slider.setAttribute("aria-label", name);
     return slider;
   });
-  const range = {low: 0, high: last, last};
+  const range = {low: 0, high: last, last, text};
   const showRange = () => {
     sliders.forEach((slider, at) => {
       slider.value = at ? range.high : range.low;
@@ -256,10 +256,28 @@ semsig.filters = async (map, key) => {
     drawHistogram(all[0], counts, error.low, error.high);
     const sum = selected.reduce((first, second) => first + second);
     const failed = selected[outcomes.findIndex(({name}) => name === "failed")];
+    const totals = outcomes.map((_, at) => data.outcome.filter((outcome) => outcome === at).length);
+    const shares = totals.map((total, at) => (selected[at] < total || !on[at]
+      ? `${number(selected[at])} of ${number(total)}` : number(total)));
     summary.textContent = `${sum < count ? `${number(sum)} of ` : ""}${number(count)} queries, ${
       number(failed)} failed`;
     set.redraw();
-    map.fire("semsig-selection", {key, count: sum, failed});
+    // The numbers in the legend and in the list of layers are those of the selection as well.
+    const limits = [
+      ...Object.values(ranges).filter(({low, high, last}) => low || high < last).map(
+        ({text}) => text.textContent.toLowerCase()),
+      ...(symbol ? [`sees ${about.signs.classes[symbol].title.toLowerCase()}`] : []),
+      ...outcomes.filter((_, at) => !on[at]).map(({name}) => `not ${name}`)];
+    for (const part of map.getContainer().querySelectorAll(`[data-queries="${key}"]`)) {
+      const {outcome} = part.dataset;
+      if (outcome !== undefined) part.textContent = shares[outcome];
+      else {
+        part.hidden = !limits.length;
+        part.textContent = `Selected: ${number(sum)} of ${number(count)} queries, ${
+          number(failed)} failed (${limits.join("; ")}). Shares and colours are of all queries.`;
+      }
+    }
+    outcomes.forEach((_, at) => semsig.countLayer(layers[at], shares[at]));
   };
   const changed = () => {
     show();

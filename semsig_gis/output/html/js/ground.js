@@ -118,6 +118,67 @@ semsig.ground = (packed, about) => {
     if (kinds.streets) draw(ctx, kinds.streets, frame, min, max, false);
     if (kinds.buildings) draw(ctx, kinds.buildings, frame, min, max, true);
   };
+  // Names along their streets, where they do not cover each other.
+  const paintNames = (map) => (ctx, min, max) => {
+    const zoom = map.getZoom();
+    const data = kinds.streets;
+    if (!data?.names || zoom < 15.5) return;
+    const {scale, left, top} = semsig.frame(map, about);
+    const dark = semsig.isDark(map);
+    ctx.font = `${zoom < 17.5 ? 11 : 13}px system-ui, sans-serif`;
+    [ctx.textAlign, ctx.textBaseline, ctx.lineJoin, ctx.lineWidth] = [
+      "center", "middle", "round", 3];
+    [ctx.strokeStyle, ctx.fillStyle] = dark ? ["#131518", "#bcc0c5"] : ["#fcfcfa", "#4a4f55"];
+    const taken = [];
+    data.called.forEach((name, shape) => {
+      if (name < 0) return;
+      const [from, to] = [data.firsts[shape], data.firsts[shape + 1]];
+      const text = data.names[name];
+      const wide = ctx.measureText(text).width;
+      const points = [];
+      let length = 0;
+      for (let at = from; at < to; at += 1) {
+        const [x, y] = [data.x[at] * scale + left, top - data.y[at] * scale];
+        const before = points.at(-1);
+        if (before) length += Math.hypot(x - before.x, y - before.y);
+        points.push({x, y, length});
+      }
+      const along = (way) => {
+        const at = Math.max(1, points.findIndex((point) => point.length >= way));
+        const [first, second] = [points[at - 1], points[at]];
+        const share = (way - first.length) / (second.length - first.length || 1);
+        return [first.x + share * (second.x - first.x), first.y + share * (second.y - first.y)];
+      };
+      // Every 400 pixels, where the street is straight enough.
+      const count = Math.floor((length - wide) / 400) + 1;
+      for (let number = 0; length > wide + 8 && number < count; number += 1) {
+        const middle = length * (number + 0.5) / count;
+        const [[x, y], [endX, endY]] = [along(middle - wide / 2), along(middle + wide / 2)];
+        const [midX, midY] = [(x + endX) / 2, (y + endY) / 2];
+        const inside = midX > min.x && midX < max.x && midY > min.y && midY < max.y;
+        if (!inside || Math.hypot(endX - x, endY - y) < 0.97 * wide) continue;
+        const spots = [-0.5, -0.25, 0, 0.25, 0.5].map(
+          (part) => [midX + part * (endX - x), midY + part * (endY - y)]);
+        const near = Math.max(16, wide / 4);
+        if (taken.some(([u, v, other, called]) => spots.some(([a, b]) =>
+          Math.hypot(a - u, b - v) < (called === name ? 250 : (near + other) / 2)))) continue;
+        taken.push(...spots.map((spot) => [...spot, near, name]));
+        const turn = Math.atan2(endY - y, endX - x);
+        ctx.save();
+        ctx.translate(midX, midY);
+        ctx.rotate(Math.abs(turn) > Math.PI / 2 ? turn + Math.PI : turn);
+        ctx.strokeText(text, 0, 0);
+        ctx.fillText(text, 0, 0);
+        ctx.restore();
+      }
+    });
+  };
   layer = semsig.boardLayer("tilePane", "semsig-ground", paint);
-  return layer;
+  const names = semsig.boardLayer("tilePane", "semsig-names", paintNames);
+  const {redraw} = layer;
+  layer.redraw = () => {
+    redraw();
+    names.redraw();
+  };
+  return semsig.together(layer, names);
 };

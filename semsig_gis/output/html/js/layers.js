@@ -104,6 +104,8 @@ window.semsig = {
     control._layers.sort((first, second) => rankOf(first) - rankOf(second));
     control._addItem = (item) => {
       const label = L.Control.Layers.prototype._addItem.call(control, item);
+      item.layer.semsigLabel = {text: label.querySelector("span > span"), name: item.name};
+      if (item.layer.semsigCount) semsig.countLayer(item.layer, item.layer.semsigCount);
       const group = groups[item.name];
       if (!group) return label;
       const list = control._overlaysList;
@@ -126,6 +128,12 @@ window.semsig = {
       for (const entry of colours) if (entry.layer !== layer) map.removeLayer(entry.layer);
     });
     control.remove().addTo(map);
+  },
+  // Changes the number of things of a layer in the layer control.
+  countLayer(layer, count) {
+    layer.semsigCount = count;
+    const {text, name} = layer.semsigLabel || {};
+    if (text) text.textContent = ` ${name.replace(/\([\d,]+\)/, `(${count})`)}`;
   },
   drawings(parts) {
     const group = L.featureGroup();

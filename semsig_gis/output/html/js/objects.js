@@ -22,15 +22,15 @@ semsig.streetObjects = (key, packed, about) => {
     data.names = data.ids.map(semsig.plain);
     if (board) board.redraw();
   });
-  // Radius of signs by zoom; large signs show the shape of the class, the largest its letter.
-  const sizes = [[12, 1], [13.5, 1.5], [15, 2.2], [16.5, 4], [17.5, 6], [19, 8], [Infinity, 10]];
+  // Radius of signs by zoom; large signs show the shape of the class, the largest its pictogram.
+  const sizes = [[12, 1], [13.5, 1.5], [15, 2.2], [16.5, 4], [17.5, 6], [19, 9], [Infinity, 12]];
   const sizeAt = (zoom) => sizes.find(([below]) => zoom < below)[1];
   const spriteOf = (number, size, dark, dots) => {
     const name = [number, size, dark, dots].join();
-    const {outline, colour, ink, symbol, drop} = classes[number];
+    const {outline, colour, ink, pictogram} = classes[number];
     sprites[name] = sprites[name] || semsig.sprite((1.3 * size + 1) * dots, (ctx) => {
       ctx.scale(size * dots, size * dots);
-      const path = new Path2D(outline);
+      const path = new Path2D(size >= 9 ? semsig.disc : outline);
       ctx.fillStyle = colour;
       ctx.fill(path);
       if (size >= 4) {
@@ -39,12 +39,7 @@ semsig.streetObjects = (key, packed, about) => {
         ctx.strokeStyle = dark ? "#131518" : bright ? "#444" : "#fff";
         ctx.stroke(path);
       }
-      if (size >= 8) {
-        ctx.font = "bold 1.2px system-ui, sans-serif";
-        ctx.textAlign = "center";
-        ctx.fillStyle = ink;
-        ctx.fillText(symbol, 0, drop + 0.42);
-      }
+      if (size >= 9) semsig.paintPictogram(ctx, pictogram, ink);
     });
     return sprites[name];
   };
@@ -81,10 +76,10 @@ semsig.streetObjects = (key, packed, about) => {
   // The key in the address: number of the layer, if there are several, and index of the object.
   const keyOf = (object) => `${key.replace("objects", "")}/${object}`;
   const showObject = (map, object) => {
-    const {title, symbol} = classes[classOf(object)];
+    const {title} = classes[classOf(object)];
     const place = placeOf(object);
     const values = [
-      `${symbol} ${title}`, sources[data.source[object]], data.ids[object],
+      title, sources[data.source[object]], data.ids[object],
       data.count[object] > 1 ? `${data.count[object]} rows of its source` : null,
       data.merged[object] || null,
       `${place.lat.toFixed(6)}, ${place.lng.toFixed(6)}`,

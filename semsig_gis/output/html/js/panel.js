@@ -162,20 +162,12 @@ semsig.details = (name, fields, values, signs, {others, kind} = {}) => {
   for (const [label, value] of facts) if (!Array.isArray(value)) fact(label, value);
   // Signatures come last, as they are long.
   table = L.DomUtil.create("table", "", box);
-  const symbols = new Set();
   for (const [label, [types, bearings, look]] of signatures) {
     const cell = row(label);
-    if (types !== null) {
-      semsig.text(cell, "code", types);
-      for (const symbol of types) symbols.add(symbol);
-    }
-    const entries = semsig.entries(types, bearings || [], look);
-    semsig.text(cell, "div", entries.join(look?.metres || look?.outside?.length ? ", " : " "));
-  }
-  if (symbols.size) {
-    const titles = [...symbols].sort().map(
-      (symbol) => `${symbol} ${(signs.classes?.[symbol] || semsig.anySign).title}`);
-    fact("Classes", titles.join(", "));
+    const entries = bearings ? semsig.entries(types, bearings, look, signs.classes)
+      : [...types || ""].map((symbol) => (signs.classes?.[symbol] || semsig.anySign).title);
+    semsig.text(cell, "div", entries.join(", "));
+    if (types !== null) semsig.text(cell, "code", types);
   }
   return box;
 };

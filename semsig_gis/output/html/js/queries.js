@@ -94,7 +94,10 @@ semsig.queries = (map, key, packed, about) => {
     const places = set.data.located[query]
       ? [set.placeOf(query, "best"), ...set.data.next[query]] : [];
     if (places.length) drawn.addLayer(semsig.hint(place, places));
-    semsig.show(map, semsig.details(nameOf(query), fields, set.data.details[query], signs), place, {
+    const [rows, values] = [
+      [...fields, "Latitude, longitude"],
+      [...set.data.details[query], place.map((part) => part.toFixed(6)).join(", ")]];
+    semsig.show(map, semsig.details(nameOf(query), rows, values, signs), place, {
       key: `query:${query + 1}`, corners: places, drawn,
     });
   };

@@ -5,23 +5,31 @@ semsig.svg = (parent, name, values, text) => {
   parent?.append(part);
   return part;
 };
-// Draw the sign of a class, and the frame of a verdict on an object, around (0, 0).
-semsig.drawSign = (parent, {outline, colour, ink, drop}, symbol) => {
-  semsig.svg(parent, "path", {d: outline, fill: colour, class: "sign"});
+// Draw the sign of a class, and the frame of a verdict on an object, around (0, 0). The sign is the
+// pictogram of the class on a disc or, without one, its letter on the shape of the class.
+semsig.disc = "M-1,0A1,1 0 1 1 1,0A1,1 0 1 1 -1,0Z";
+semsig.drawSign = (parent, {outline, colour, ink, drop, pictogram}, symbol) => {
+  semsig.svg(parent, "path", {d: pictogram ? semsig.disc : outline, fill: colour, class: "sign"});
+  if (pictogram) {
+    semsig.svg(parent, "path", {
+      d: pictogram, fill: ink, class: "picture", transform: "scale(.085)translate(-8-8)"});
+    return;
+  }
   semsig.svg(parent, "text", {y: drop + 0.42, "font-size": 1.2, fill: ink}, symbol);
 };
 semsig.drawFrame = (parent, {outline, colour}) => {
   semsig.svg(parent, "path", {d: outline, stroke: colour, class: "frame", transform: "scale(1.45)"});
 };
 // The sign of an unknown class.
-semsig.anySign = {outline: "M-1,0A1,1 0 1 1 1,0A1,1 0 1 1 -1,0Z", colour: "#808080",
+semsig.anySign = {outline: semsig.disc, colour: "#808080",
   ink: "#ffffff", drop: 0, title: "any class"};
-// A text for each object of a signature: symbol, bearing and, if known, distance.
-semsig.entries = (types, bearings, look = {}) => bearings.map((degrees, at) => {
+// A text for each object of a signature: title, bearing and, if known, distance.
+semsig.entries = (types, bearings, look = {}, classes = {}) => bearings.map((degrees, at) => {
   const metres = look.metres?.[at] ?? null;
   const far = metres === null ? "" : `\u00a0${metres}\u00a0m`;
   const outside = look.outside?.includes(at) ? "\u00a0(outside)" : "";
-  return `${types ? `${types[at]}\u00a0` : ""}${degrees}\u00b0${far}${outside}`;
+  const title = types ? (classes[types[at]] || semsig.anySign).title : null;
+  return `${title ? `${title}\u00a0` : ""}${degrees}\u00b0${far}${outside}`;
 });
 // Names of the verdicts, by the kind of comparison of two signatures.
 semsig.comparisons = {
@@ -72,7 +80,7 @@ semsig.wheel = (
   const drawing = semsig.svg(figure, "svg", {viewBox: "-58 -68 116 126", role: "group"});
   const places = bearings.map((degrees) => degrees * Math.PI / 180);
   const at = (angle, radius) => [radius * Math.sin(angle), -radius * Math.cos(angle)];
-  const entries = semsig.entries(types, bearings, look).map(
+  const entries = semsig.entries(types, bearings, look, classes).map(
     (entry) => entry.replaceAll("\u00a0", " "));
   drawing.setAttribute("aria-label", `${label}, clockwise from north: ${entries.join(", ")}`);
   for (const [from, to] of look.sectors || []) {
@@ -114,7 +122,7 @@ semsig.wheel = (
     const verdict = comparison[index]?.verdict ?? (look.outside?.includes(index) ? "outside" : "");
     const object = semsig.svg(drawing, "g", {
       class: `object ${verdict}`, role: "img", tabindex: index ? -1 : 0,
-      "aria-label": [entries[index], classes[types?.[index]]?.title].filter(Boolean).join(", "),
+      "aria-label": entries[index],
     });
     if (!look.metres) {
       const [[x, y], [outX, outY]] = [at(angle, free.radius + size), at(angle, 54)];
