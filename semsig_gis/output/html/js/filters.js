@@ -188,7 +188,7 @@ semsig.filters = async (map, key) => {
     input.type = "checkbox";
     const sign = L.SVG.create("svg");
     sign.setAttribute("viewBox", "-1.5 -1.5 3 3");
-    sign.setAttribute("class", "semsig-sign");
+    sign.setAttribute("class", "semsig-sign mark");
     sign.setAttribute("aria-hidden", "true");
     const path = L.SVG.create("path");
     path.setAttribute("d", outline);
