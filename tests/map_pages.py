@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,6 +14,7 @@ import geopandas as gpd
 import shapely
 from machine import PATIENCE_S
 from pyproj import Transformer
+from selenium.webdriver import ActionChains
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
@@ -141,7 +143,8 @@ class MapPage(BrowserPage):
         return self.texts(".leaflet-control-layers-overlays label")
 
     def switch(self, name: str) -> None:
-        """Click a layer in the layer control."""
+        """Click a layer in the layer control, which is folded where the panel is open at first."""
+        ActionChains(self.browser).move_to_element(self.one(".leaflet-control-layers")).perform()
         at = next(at for at, layer in enumerate(self.layers()) if layer.startswith(name))
         self.all(".leaflet-control-layers-overlays label")[at].click()
 
@@ -183,6 +186,11 @@ class MapPage(BrowserPage):
         pairs = (line.split("\t", 1) for line in lines if "\t" in line)
         labels = {label.strip(): value.strip() for label, value in pairs}
         return {"text": text, "title": title.strip(), **labels}
+
+    def classes(self, label: str) -> list[str]:
+        """Return the titles of the objects that the panel lists with their bearings."""
+        parts = self.facts()[label].replace("\u00a0", " ").split(", ")
+        return [re.sub(r" \d+°.*", "", part) for part in parts]
 
     def click(self, database: SignatureDatabase, cell: int) -> dict[str, str]:
         """Click the middle of a cell; return the facts in the panel."""
@@ -310,3 +318,8 @@ def hostile_database(database: SignatureDatabase) -> SignatureDatabase:
     """Return the database with hostile class titles and licences."""
     taxonomy = hostile_taxonomy(database.taxonomy)
     return replace(database, taxonomy=taxonomy, licenses=(f"{HOSTILE}: {HOSTILE}",))
+
+
+def titles(database: SignatureDatabase, types: str) -> list[str]:
+    """Return the titles of symbols of classes."""
+    return [database.taxonomy.by_symbol(symbol).title for symbol in types]

@@ -95,7 +95,7 @@ def test_everything_on_one_map(run_ok: RunOk, monkeypatch: pytest.MonkeyPatch) -
     page = map_page(run_ok, f"{options} --location answer.tif --objects objects.parquet")
     for name in (
         *("Same types", "Chance to be found", "What has changed", "Chance within 50 m"),
-        "Share of queries that fail",
+        "Share of queries found",
         *("Lines from true to estimated places", "Best place"),
     ):
         assert page.count(f'"{name}" :') == 1

@@ -143,8 +143,8 @@ def test_click_shows_signatures_and_best_place(evaluation_page: MapPage) -> None
         assert mark.edge in {"#000000", "#ffffff"}
     assert evaluation_page.drawn(OUTCOMES[last].edge, canvas) > 0
     text = evaluation_page.panel().replace("\u00a0", " ")
-    legend = f"{row['types'][0]} {CITY.taxonomy.by_symbol(row['types'][0]).title}"
-    for words in (row["types"], row["query_types"], legend, str(row["cell_id"])):
+    title = f"{CITY.taxonomy.by_symbol(row['types'][0]).title} "
+    for words in (row["types"], row["query_types"], title, str(row["cell_id"])):
         assert words in text
     assert f"of {len(CITY):,}" in text
     following = np.searchsorted(CITY.cell_ids, EVALUATION.next_cell_ids[-1])
@@ -160,15 +160,15 @@ def test_click_shows_signatures_and_best_place(evaluation_page: MapPage) -> None
 
 def test_panel_draws_signatures_as_wheels(evaluation_page: MapPage) -> None:
     lengths = EVALUATION.queries["query_length"]
-    letters = """
-    return [...document.querySelectorAll(".semsig-wheels text")].map((letter) =>
-      letter.getAttribute("font-size") * letter.getScreenCTM().a);
+    pictograms = """
+    return [...document.querySelectorAll(".semsig-wheels .picture")].map(
+      (picture) => 16 * picture.getScreenCTM().a);
     """
     for query in (int(lengths.argmin()), int(lengths.argmax())):
         name = f"Query {query + 1:,}: "
         assert evaluation_page.search(name, Keys.ENTER)[0].startswith(name)
         assert evaluation_page.panel().startswith(name)
-        assert min(evaluation_page.ask(letters)) >= 9.0
+        assert min(evaluation_page.ask(pictograms)) >= 9.0
     wheels = evaluation_page.all(".semsig-wheels figure")
     row = EVALUATION.queries.iloc[query]
     expected = (
@@ -179,7 +179,7 @@ def test_panel_draws_signatures_as_wheels(evaluation_page: MapPage) -> None:
     for wheel, (label, types, bearings) in zip(wheels, expected, strict=False):
         assert bearings is not None
         assert wheel.find_element(By.TAG_NAME, "figcaption").text.removesuffix(", to 30 m") == label
-        degrees = [f"{symbol} {round(float(bearing)) % 360}°"
+        degrees = [f"{CITY.taxonomy.by_symbol(symbol).title} {round(float(bearing)) % 360}°"
                    for symbol, bearing in zip(types, bearings, strict=True)]  # fmt: skip
         description = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
         objects = f"{label}, clockwise from north: {', '.join(degrees)}"

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import folium
@@ -10,11 +13,13 @@ import numpy as np
 import pytest
 from map_pages import IMAGES, LEGEND
 from noisy_cells import parts_of
+from pyproj import Transformer
 from selenium.webdriver.common.by import By
 from worlds import random_town
 
 from semsig_gis.core import ANSWERS, CANDIDATE_RAMP, VERDICTS, Signature, percent
 from semsig_gis.database import ObjectStore
+from semsig_gis.localization import VERDICTS as COUNTED
 from semsig_gis.localization import Method, build_index, cell_noise, localize, locate, named_noise
 from semsig_gis.observation import Photo, View
 from semsig_gis.output import OUTLINES, SECTOR, localization_map, location_map
@@ -27,6 +32,7 @@ if TYPE_CHECKING:
 WORLD = random_town()
 CITY = WORLD.database
 STORE = ObjectStore.of(WORLD.street_objects)
+POINTED = "#7733ff"
 LONGEST = int(CITY.lengths.argmax())
 CELL = CITY.signature(LONGEST)
 CODES, BEARINGS = parts_of(CELL)
@@ -49,19 +55,18 @@ def test_location_map_has_layers_legend_and_signs(page: MapPage) -> None:
     assert location.answer.given
     page.open(location_map(location))
     assert page.browser.title == "Where it was seen"
-    assert len(page.all(IMAGES)) == 2
-    numbers = [str(element.get_property("textContent")) for element in page.all(".semsig-number")]
-    assert sorted(numbers) == ["1", "2", "3", "4", "5"]
+    assert len(page.all(IMAGES)) == 1
+    assert page.all(".semsig-number") == []  # the candidates are hidden at first
     legend = page.text(LEGEND)
     assert "The answer, ellipse: 90 %" in legend
-    assert "within 50 m of it: chance over 99 %." in legend
+    assert "within 50 m with a chance of over 99 %." in legend
     assert "90 % in" in legend
-    assert "matched: a street object" in legend
+    assert "matched: said, and there" in legend
     assert page.circles(ANSWERS["given"].colour) == 1
-    counts = location.explanations[0].counts
-    assert min(counts["matched"], counts["false"]) > 0
-    for verdict in ("matched", "misnamed", "false"):
-        assert page.circles(VERDICTS[verdict]) == counts[verdict]
+    canvas = "canvas.semsig-objects"
+    for verdict, count in location.explanations[0].counts.items():
+        if verdict != "missed":  # its frame has the colour of the paper
+            assert (page.drawn(VERDICTS[verdict], canvas) > 0) == (count > 0)
     ellipse = """
     const rings = lines(({options}) => options.color === arguments[0]);
     const [ring] = rings[0].getLatLngs();
@@ -70,35 +75,85 @@ def test_location_map_has_layers_legend_and_signs(page: MapPage) -> None:
     rings, across, corners = page.ask(ellipse, ANSWERS["given"].colour)
     assert (rings, corners) == (1, 73)
     assert across == pytest.approx(2.0 * location.estimate.ellipse()[0], abs=0.4)
-    other = location.explanations[1].counts["matched"]
-    for layer, matched, images in (
-        ("Objects from rank 1", 0, 2),
-        ("Objects from rank 2", other, 2),
-        ("Objects seen from a cell", other, 1),
-        ("Regions of 50, 90 and 99 %", other, 2),
+    for layer, boards in (
+        ("Objects from rank 1", 0),
+        ("Objects from rank 2", 1),
+        ("Objects seen from a cell", 1),
+        ("Regions of 50, 90 and 99 %", 1),
     ):
         page.switch(layer)
-        assert (page.circles(VERDICTS["matched"]), len(page.all(IMAGES))) == (matched, images)
+        assert (len(page.all(canvas)), len(page.all(IMAGES))) == (boards, 1)
     page.switch("Candidates")
-    page.until_gone(".semsig-number")
+    numbers = [str(element.get_property("textContent")) for element in page.all(".semsig-number")]
+    assert sorted(numbers) == ["1", "2", "3", "4", "5"]
     page.switch("Best place")
     assert page.circles(ANSWERS["given"].colour) == 0
 
 
-def test_clicks_describe_places_and_objects(page: MapPage) -> None:
+def test_first_view_shows_what_was_said_next_to_what_is_there(page: MapPage) -> None:
+    location = replace(answer_with_errors(), place_name=lambda *_: "on High Street")
+    page.open(location_map(location))
+    assert page.all(".semsig-legend[open], .leaflet-control-layers-expanded") == []
+    text = page.panel().replace("\u00a0", " ")
+    lat, lon = location.degrees[::-1]
+    chance, place = percent(location.answer.mass), f"{lat:.6f}, {lon:.6f}"
+    for words in ("Found", "On High Street", chance, place):
+        assert words in text
+    links = {link.text: link for link in page.all(".semsig-links a")}
+    assert {title: link.get_attribute("href") for title, link in links.items()} == location.links
+    assert {link.get_attribute("rel") for link in links.values()} == {"noopener noreferrer"}
+    title_of = {item.name: item.title for item in CITY.taxonomy.classes}
+    rows: list[Any] = location.explanations[0].to_dict()["rows"]
+    rows = [row for row in rows if row["verdict"] != "outside"]
+    texts = page.texts(".semsig-said tbody tr")
+    shown = Counter(tuple(filter(None, re.split(r"[\t\n]+", text))) for text in texts)
+    expected: Counter[tuple[str, ...]] = Counter()
+    for row in rows:
+        said, there = ["not said"], ["not there"]
+        if row["query_class"]:
+            said = [title_of[row["query_class"]], f"{row['query_bearing']:.0f}°"]
+        if row["object_class"]:
+            there = [title_of[row["object_class"]]]
+            there.append(f"{row['object_bearing']:.0f}°, {row['distance']:.0f} m")
+        more = ["of another class"] if row["verdict"] == "misnamed" else []
+        expected[*said, *there, *more] += 1
+    assert shown == expected
+    assert {row["verdict"] for row in rows} >= {"matched", "misnamed", "false"}
+    # All signs are in view, next to the panel.
+    place = "return map.latLngToContainerPoint(arguments[0])"
+    width = page.one(".semsig-panel").rect["x"]
+    for x, y in (
+        location.explanations[0]
+        .table.to_crs(4326)
+        .geometry.dropna()
+        .apply(lambda point: (point.y, point.x))
+    ):
+        shown_at = page.ask(place, [x, y])
+        assert 0 < shown_at["x"] < width
+        assert 0 < shown_at["y"] < page.one(".folium-map").rect["height"]
+
+
+def test_objects_and_rows_of_an_answer_point_at_each_other(page: MapPage) -> None:
     location = answer_with_errors()
     page.open(location_map(location))
-    page.point_at("circles(arguments[0])[0]", ANSWERS["given"].colour)
-    text = page.panel()
-    assert text.startswith("The answer")
-    assert f"Chance\t{percent(location.answer.mass)}" in text
-    assert f"Standard deviation of the heading\t{location.estimate.heading_sigma:.1f}°" in text
-    text = page.panel_of(VERDICTS["matched"])
-    rows: list[Any] = location.explanations[0].to_dict()["rows"]
-    matched = next(row for row in rows if row["verdict"] == "matched")
+    row = page.one(".semsig-said tbody tr")
+    before = page.drawn(POINTED, "canvas.semsig-objects")
+    page.ask("arguments[0].dispatchEvent(new MouseEvent('mouseover'))", row)
+    page.until(lambda: page.drawn(POINTED, "canvas.semsig-objects") > before)
+    page.ask("semsig.hide(map)")
+    matched = next(row for row in location.explanations[0].rows if row["verdict"] == "matched")
+    to_degrees = Transformer.from_crs(CITY.crs, 4326)
+    page.click_at(to_degrees.transform(*matched["place"]))
     title = CITY.taxonomy.by_name(matched["object_class"]).title
-    for fact in ("Matched", title, matched["source_id"], f"{matched['distance']:.1f} m"):
-        assert fact in text
+    assert title in page.text(".semsig-said tr.lit")
+    page.ask("semsig.hide(map)")
+    page.point_at("circles(arguments[0])[0]", ANSWERS["given"].colour)
+    assert page.panel().startswith("Found")
+    page.one(".semsig-answer summary").click()
+    numbers = page.text(".semsig-answer details")
+    assert f"{location.estimate.heading_sigma:.1f}°" in numbers
+    page.ask("circles('#ffffff').find((circle) => circle.getTooltip())?.fire('click')")
+    page.switch("Candidates")
     page.ask("circles('#ffffff').find((circle) => circle.getTooltip()).fire('click')")
     assert page.panel().startswith("Rank 5")
 
@@ -199,5 +254,5 @@ def test_query_without_types_is_drawn_as_dots(page: MapPage) -> None:
     page.panel_of(CANDIDATE_RAMP[0])
     query, cell = page.all(".semsig-wheels figure")
     assert len(query.find_elements(By.CSS_SELECTOR, ".object .north")) == len(CELL)
-    assert query.find_elements(By.TAG_NAME, "text") == []
-    assert len(cell.find_elements(By.CSS_SELECTOR, ".object.matched text")) == len(CELL)
+    assert query.find_elements(By.CSS_SELECTOR, ".picture") == []
+    assert len(cell.find_elements(By.CSS_SELECTOR, ".object.matched .picture")) == len(CELL)

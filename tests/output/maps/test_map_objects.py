@@ -80,11 +80,15 @@ def test_objects_map_has_layers_and_legend_by_class(page: MapPage) -> None:
     legend = page.one(LEGEND).text
     assert f"{len(OBJECTS):,} objects of {len(OBJECTS.class_counts)} classes" in legend
     for signs in (".semsig-legend", ".leaflet-control-layers-overlays"):
-        for part, field in (("path", "colour"), ("text", "ink")):
-            shown = page.all(f"{signs} .semsig-sign {part}")
+        for at, field in enumerate(("colour", "ink"), start=1):
+            shown = page.all(f"{signs} .semsig-sign path:nth-child({at})")
             colours = [getattr(SIGNS[code], field) for code in OBJECTS.class_counts]
             assert [element.get_attribute("fill") for element in shown] == colours
-    assert str(OBJECTS.licenses[0]) in page.one(".leaflet-control-attribution").text
+        pictograms = [element.get_attribute("d") for element in shown]
+        assert pictograms == [SIGNS[code].pictogram for code in OBJECTS.class_counts]
+    # The layers of a licence are in the part about the data.
+    assert page.text(".leaflet-control-attribution") == OBJECTS.licenses[0].terms
+    assert str(OBJECTS.licenses[0]) in page.text(LEGEND)
     assert page.drawn(SIGNS[CODE].colour, BOARD) > 0
     boxes = "'.leaflet-control-layers-overlays input:checked'"
     page.ask(f"document.querySelectorAll({boxes}).forEach((box) => box.click())")
@@ -312,7 +316,7 @@ def test_several_maps_are_drawn_on_one_map(page: MapPage) -> None:
     # Cells are still found by their number, and each credit is given once.
     assert page.search(str(CITY.cell_ids[0]), Keys.ENTER) == [f"Cell {CITY.cell_ids[0]}"]
     credit = page.text(".leaflet-control-attribution")
-    assert [credit.count(line) for line in ("Mapper (CC0)", str(OBJECTS.licenses[0]))] == [1, 1]
+    assert [credit.count(line) for line in ("Mapper (CC0)", OBJECTS.licenses[0].terms)] == [1, 1]
 
 
 def test_page_of_60_000_buildings_is_small() -> None:

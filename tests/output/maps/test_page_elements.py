@@ -76,7 +76,7 @@ TURNED = dataclasses.replace(OBJECTS, table=OBJECTS.table.to_crs("EPSG:32631"))
 NOWHERE, FAR = LANE.set_crs(None, allow_override=True), (0.0, 0.0, 1.0, 1.0)
 MAPS = maps_of(CITY, OBJECTS, EVALUATION, named_noise("light"))
 LAYERS = {
-    "evaluation": {"Share of queries that fail", "Lines from true to estimated places"},
+    "evaluation": {"Share of queries found", "Lines from true to estimated places"},
     "localization": {"Candidates (5)"},
     "location": {"Best place", "Chance of a cell", "Candidates (5)"},
     "ambiguity": {"Same types", "Same types and angle levels"},

@@ -193,6 +193,7 @@ semsig.answerObjects = (about, signs) => {
       const index = indexAt(map.latLngToLayerPoint(latlng));
       if (index < 0) return false;
       show();
+      lit = -1;
       light(index);
       const row = map.getContainer().querySelector(`[data-answer="${rank}"] tr.lit`);
       row?.scrollIntoView({block: "nearest"});

@@ -166,7 +166,7 @@ semsig.details = (name, fields, values, signs, {others, kind} = {}) => {
     const cell = row(label);
     const entries = bearings ? semsig.entries(types, bearings, look, signs.classes)
       : [...types || ""].map((symbol) => (signs.classes?.[symbol] || semsig.anySign).title);
-    semsig.text(cell, "div", entries.join(", "));
+    semsig.text(cell, "span", entries.join(", "));
     if (types !== null) semsig.text(cell, "code", types);
   }
   return box;
