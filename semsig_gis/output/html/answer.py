@@ -192,8 +192,9 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
         """Return the class of an object, and its bearing and distance as a text."""
         if name is None:
             return None
-        turn = None if bearing is None else f"{north.from_grid(bearing):.0f}°"
-        text = ", ".join(filter(None, (turn, metres and f"{metres:.0f} m")))
+        turn = "" if bearing is None else f"{north.from_grid(bearing):.0f}°"
+        away = "" if metres is None else f"{metres:.0f} m"
+        text = ", ".join(filter(None, (turn, away)))
         return {"symbol": symbols.get(name, "?"), "text": text}
 
     rays = [
@@ -209,8 +210,8 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
     compared = {row["query"] for row in candidate["rays"]}
     codes = [] if query.codes is None else query.codes.tolist()
     rest = [code for number, code in enumerate(codes) if number not in compared]
-    seen = location.posterior.database.signature(candidate["cell"]).codes
-    words = location.taxonomy.words
+    words, database = location.taxonomy.words, location.posterior.database
+    seen = database.codes[slice(*database.offsets[candidate["cell"] :][:2])]
     there = "none on this map" if rays else words(seen)
     more = [[words(rest), there]] if rest else []
     lat, lon = candidate["rays"][0]["from"] if candidate["rays"] else candidate["place"]

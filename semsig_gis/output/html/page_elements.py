@@ -193,7 +193,8 @@ def needs_server(tiles: str) -> bool:
 
     Such pages do not say where they are from, which the policy of OpenStreetMap's server requires.
     """
-    return urlsplit(_tile_provider(tiles).url).hostname == "tile.openstreetmap.org"
+    address = str(_tile_provider(tiles).url)
+    return urlsplit(address).hostname == "tile.openstreetmap.org"
 
 
 def _tile_provider(name: str) -> xyzservices.TileProvider:

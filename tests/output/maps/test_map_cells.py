@@ -72,7 +72,7 @@ def test_click_describes_a_cell_and_counts_those_that_look_the_same(page: MapPag
         # The wheel has the exact bearings and distances.
         part = slice(*CITY.offsets[cell : cell + 2])
         wheel = page.one(".semsig-wheels svg").get_attribute("aria-label")
-        entries = re.findall(r"([\w ]+) (\d+)° (\d+) m", str(wheel))
+        entries = re.findall(r"([^,:]+) (\d+)° (\d+) m", str(wheel))
         assert [entry[0].strip() for entry in entries] == titles(CITY, CITY.types(cell))
         off = [float(entry[1]) for entry in entries] - CITY.bearings[part]
         assert np.abs((off + 180.0) % 360.0 - 180.0).max() <= 1.5

@@ -19,7 +19,6 @@ from worlds import random_town
 
 from semsig_gis.core import ANSWERS, CANDIDATE_RAMP, VERDICTS, Signature, percent
 from semsig_gis.database import ObjectStore
-from semsig_gis.localization import VERDICTS as COUNTED
 from semsig_gis.localization import Method, build_index, cell_noise, localize, locate, named_noise
 from semsig_gis.observation import Photo, View
 from semsig_gis.output import OUTLINES, SECTOR, localization_map, location_map
