@@ -19,6 +19,7 @@ ON_STREET_M = 40.0
 CORNER_M = 25.0
 CROSSING_M = 12.0  # largest gap between the lines of two streets that meet
 NEAR_M = 60.0
+FAR_M = 300.0
 
 
 class PlaceNames:
@@ -50,7 +51,17 @@ class PlaceNames:
         parts = [f"on {name}" for name in names]
         if len(names) > 1:
             parts = [f"at the corner of {' and '.join(names)}"]
-        return ", ".join([*parts, *([] if near is None else [f"near {near}"])])
+        if near is not None:
+            parts.append(f"near {near}")
+        return ", ".join(parts) or self._far(place)
+
+    def _far(self, place: shapely.Point) -> str:
+        """Return the distance of the nearest name; empty if none is near enough."""
+        around = self._streets.around(place, FAR_M) | self._buildings.around(place, FAR_M)
+        if not around:
+            return ""
+        name = min(around, key=lambda name: around[name])
+        return f"{round(around[name], -1):.0f} m from {name}"
 
     def _meet(self, place: shapely.Point, first: str, second: str) -> bool:
         """Whether two streets meet near a place."""

@@ -40,7 +40,7 @@ from semsig_gis.database.file import (
     save_database,
 )
 from semsig_gis.database.occlusion import TOLERANCE_M, NearbyFootprints
-from semsig_gis.database.place_names import NEAR_M, PlaceNames
+from semsig_gis.database.place_names import FAR_M, PlaceNames
 from semsig_gis.database.viewpoints import reproject, select_elements
 from semsig_gis.objects import licenses_of, open_objects, save_objects
 from semsig_gis.storage import (
@@ -394,7 +394,7 @@ def names_around(folder: Path, xy: tuple[float, float]) -> PlaceNames:
     files = stored_inputs(folder)
     crs = open_objects(files.pop("objects"), box=EMPTY_BOX).crs
     x, y = xy
-    box = (x - NEAR_M, y - NEAR_M, x + NEAR_M, y + NEAR_M)
+    box = (x - FAR_M, y - FAR_M, x + FAR_M, y + FAR_M)
     houses, lines = _read_ground(files, crs, box)
     return PlaceNames(lines, houses)
 

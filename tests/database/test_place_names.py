@@ -50,7 +50,9 @@ def store(
         ((230, 5), "on High Street, near Town Hall"),
         ((250, 55), "near Town Hall"),
         ((400, 55), "near High Street"),
-        ((400, 155), ""),
+        ((400, 155), "160 m from High Street"),
+        ((300, 170), "160 m from Town Hall"),
+        ((400, 355), ""),
     ],
 )
 def test_place_is_named_by_what_is_around(xy: tuple[float, float], name: str) -> None:
