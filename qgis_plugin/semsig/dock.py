@@ -56,6 +56,7 @@ LAST_DATABASE = "semsig/database"
 CELL_COLOUR, LOOKALIKE_COLOUR = QColor("#d55e00"), QColor("#0072b2")
 LOOKALIKES = 20
 LARGEST_SCALE = 2500.0  # denominator
+WIDEST = 110  # pixels, of a column of the table
 CLASS_ROLE = 0x0100  # the first role for data of plugins
 
 
@@ -148,6 +149,7 @@ class SemsigDock(QgsDockWidget):
         table.verticalHeader().setDefaultSectionSize(22)
         table.setMinimumHeight(160)
         table.horizontalHeader().setStretchLastSection(True)
+        table.horizontalHeader().setMaximumSectionSize(WIDEST)
         table.itemSelectionChanged.connect(self._zoom_to_selected)
         return table
 
@@ -398,7 +400,9 @@ class SemsigDock(QgsDockWidget):
                 self.table.setItem(row, column, item)
         named = any(candidate.get("place_name") for candidate in self.candidates)
         self.table.setColumnHidden(2, not named)
-        self.table.resizeColumnsToContents()
+        for column in range(3):  # the last has the rest, in several lines
+            self.table.resizeColumnToContents(column)
+        self.table.resizeRowsToContents()
         self.table.clearSelection()
         self.table.blockSignals(False)  # noqa: FBT003
 
