@@ -210,7 +210,8 @@ class Report:
 
     ``headline`` is the result in one sentence. ``settings`` are the names and values of the
     settings, ``command`` is the command line; ``taxonomy`` has the classes of the objects in the
-    scenes; ``facts`` are specs, versions and machine as plain values for JSON.
+    scenes; ``credits`` are the attribution lines of the data; ``facts`` are specs, versions and
+    machine as plain values for JSON.
     """
 
     title: str
@@ -220,4 +221,5 @@ class Report:
     command: str = ""
     sections: tuple[Section, ...]
     taxonomy: Taxonomy
+    credits: tuple[str, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)

@@ -143,10 +143,7 @@ def failure_pairs(
         )
         ties = int(row["tied"])
         note = "" if ties == 1 else f" {ties:,} cells fit it as well as the one shown."
-        classes = ", ".join(
-            f"{item.title} ({item.symbol}{f', {count}' * (count > 1)})"
-            for item, count in Counter(map(database.taxonomy.by_code, codes)).items()
-        )
+        classes = database.taxonomy.words(codes)
         pairs.append(
             Pair(
                 title=f"Query {number + 1:,}: off by {length(float(row['error_m']))}",
@@ -289,9 +286,7 @@ def draw_scenes(scenes: Sequence[Scene]) -> Picture:
         return saved(
             figure,
             title="; ".join(scene.title for scene in scenes),
-            description=" ".join(
-                _scene_description(column.scene, column.signs) for column in columns
-            ),
+            description=" ".join(_scene_description(column.scene) for column in columns),
         )
 
 
@@ -309,8 +304,8 @@ class _Column:
     def of(cls, scene: Scene) -> _Column:
         signs = class_signs(scene.taxonomy)
         titles = textwrap.wrap(label(scene.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
-        types = label(scene.types, TYPE_LETTERS * TYPE_LINES)
-        lines = textwrap.wrap(types, TYPE_LETTERS) or ["sees nothing"]
+        seen = label(_seen(scene), TYPE_LETTERS * TYPE_LINES)
+        lines = textwrap.wrap(f"sees {seen}", TYPE_LETTERS)
         if scene.asked:
             lines.append("around the circle: the query")
         place = f"{scene.lat:.6f}°, {scene.lon:.6f}°"
@@ -457,19 +452,19 @@ def _legend_keys(scene: Scene, signs: dict[int, ClassSign]) -> list[tuple[Line2D
     return keys
 
 
-def _scene_description(scene: Scene, signs: dict[int, ClassSign]) -> str:
+def _seen(scene: Scene) -> str:
+    """Return what is seen in words."""
+    return one_line(scene.taxonomy.words([item.code for item in scene.objects]))
+
+
+def _scene_description(scene: Scene) -> str:
     """Return the alternative text of a scene."""
-    query = "".join(signs.get(code, UNKNOWN).symbol for code, _ in scene.asked)
-    counts = ", ".join(
-        f"{one_line(signs.get(code, UNKNOWN).title).lower()} ({number})"
-        for code, number in sorted(Counter(item.code for item in scene.objects).items())
-    )
-    types = f"Signature {scene.types}, seen" if scene.types else "Nothing is seen"
+    query = one_line(scene.taxonomy.words([code for code, _ in scene.asked]))
     place = f"from {scene.lat:.6f}, {scene.lon:.6f}"
     sentences = (
         scene.title,
-        f"{types} {place}{f': {counts}' if counts else ''}",
-        f"The query had {query}" if query else "",
+        f"Seen {place}: {_seen(scene)}",
+        f"The query had {query}" if scene.asked else "",
         _error_text(scene),
     )
     return " ".join(f"{text[:1].upper()}{text[1:]}." for text in sentences if text)

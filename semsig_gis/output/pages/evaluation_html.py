@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import Evaluation
 
 GROUP_COLUMNS = {
-    "p50": "P(error ≤ 50 m)",
-    "recall10": "recall@10 %",
+    "p50": "within 50 m",
+    "recall10": "true cell in the best 10 %",
     "coverage": "answered",
     "precision": "right, of these",
 }
@@ -75,8 +75,8 @@ def evaluation_page(
     evaluation.rows_in(database)  # raises if another database was searched
     settings = evaluation_settings(evaluation)
     text = (
-        "The true cell, next to the cell that it was mistaken for. Letters "
-        "around the circle are the distorted query."
+        "The true cell, next to the cell that it was mistaken for. Signs around the circle are "
+        "the distorted query."
     )
     pairs = failure_pairs(evaluation, database)
     failure = Section(name="failures", title="The worst failures", text=(text,), pairs=pairs)
@@ -105,6 +105,7 @@ def evaluation_page(
             *failures,
         ),
         taxonomy=database.taxonomy,
+        credits=database.licenses,
         facts=evaluation.summary(),
     )
 
@@ -166,7 +167,7 @@ def _group_section(evaluation: Evaluation) -> Section:
         text=(
             (
                 "Few objects say little, and a street that looks like a hundred others cannot be "
-                "told apart from them."
+                "distinguished from them."
             ),
         ),
         numbers=tuple(itertools.chain(*(_group_numbers(table, row) for table, *_, row in groups))),

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 # Special characters of Markdown that `escaped` leaves: anywhere, and at the start of a paragraph.
 MARKS = re.compile(r"([\\`*_\[\]{}~$])")
 FIRST_MARKS = re.compile(r"^(\d*)([-+=>#.)])")
-RUN = "What was run"
+RUN, DATA = "What was run", "Sources of the data"
 
 
 def html_page(report: Report, pictures: Mapping[str, Picture], *, standalone: bool = False) -> str:
@@ -63,6 +63,7 @@ def html_page(report: Report, pictures: Mapping[str, Picture], *, standalone: bo
         alts={name: picture.description for name, picture in pictures.items()},
         standalone=standalone,
         run=RUN,
+        data=DATA,
         version=__version__,
     )
 
@@ -94,6 +95,7 @@ def markdown_page(report: Report, pictures: Mapping[str, Picture]) -> str:
         settings = Table("", ("Setting", "Value"), report.settings, labels=2)
         blocks.append(markdown_rows(settings, _inline))
     blocks += [_paragraph(report.command)] if report.command else []
+    blocks += [f"## {DATA}", *map(_paragraph, report.credits)] if report.credits else []
     return "\n\n".join(blocks) + "\n"
 
 
@@ -253,6 +255,7 @@ def _json(report: Report) -> str:
             for section in report.sections
         ],
         "classes": report.taxonomy.to_list(),
+        "credits": report.credits,
         "facts": report.facts,
         "version": __version__,
     }

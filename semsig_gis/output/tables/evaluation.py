@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 
 # Titles of the figures of an evaluation, by column; those of the tables by group are shorter.
 FIGURES = {
-    **{f"p{metres}": f"P(error ≤ {metres} m)" for metres in ERROR_BREAKS},
-    **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
-    **{f"near{count}": f"recall@{count} within {NEAR_METRES} m" for count in NEAR_PLACES},
+    **{f"p{metres}": f"Placed within {metres} m" for metres in ERROR_BREAKS},
+    **{f"recall{share}": f"True cell in the best {share} %" for share in (1, 10)},
+    **{f"near{count}": f"Within {NEAR_METRES} m: one of {count} places" for count in NEAR_PLACES},
     "coverage": f"Answered, with a chance of {DEFAULT_RULE.threshold:g} or more",
     "precision": "Right answers, of these",
     "in_region": "True cell in the region of 90 %",
 }
 GROUP_FIGURES = {
-    **{f"p{metres}": f"P(≤ {metres} m)" for metres in ERROR_BREAKS[1:]},
-    **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
+    **{f"p{metres}": f"Within {metres} m" for metres in ERROR_BREAKS[1:]},
+    **{f"recall{share}": f"In best {share} %" for share in (1, 10)},
     "coverage": "Answered",
     "precision": "Right",
     "in_region": "In region",

@@ -156,6 +156,7 @@ def identifiability_page(
             _rank_section(check),
         ),
         taxonomy=identifiability.database.taxonomy,
+        credits=identifiability.database.licenses,
         facts={"identifiability": facts, "check": check.to_dict(), "machine": machine()},
     )
 

@@ -17,7 +17,13 @@ from worlds import random_town
 from semsig_gis.core import InputError
 from semsig_gis.evaluation import evaluate, parse_chain
 from semsig_gis.localization import Method, build_index, named_noise
-from semsig_gis.output import evaluation_headline, evaluation_page, paris_points, write_page
+from semsig_gis.output import (
+    evaluation_headline,
+    evaluation_page,
+    paris_points,
+    write_page,
+    write_report,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -80,8 +86,8 @@ def test_curves_and_numbers_agree_with_the_evaluation(run: Callable[[], Evaluati
     assert all(low <= y <= high for low, y, high in bands)
     shown = {number.row: number for number in errors.numbers}
     means = evaluation.means()
-    assert shown["P(error ≤ 50 m)"].ours == means["value"]["p50"]
-    assert shown["recall@10 %"].high == means["high"]["recall10"]
+    assert shown["Placed within 50 m"].ours == means["value"]["p50"]
+    assert shown["True cell in the best 10 %"].high == means["high"]["recall10"]
     counts = [number.ours or 0 for number in groups.numbers if number.column == "queries"]
     assert sum(counts) == 2 * 60  # by objects seen, and by equal cells
     for plot, table in zip(
@@ -99,7 +105,7 @@ def test_figures_of_the_paper_are_shown_for_the_same_settings() -> None:
     (plot,) = sections(by_distance())["errors"].plots
     assert [point[:2] for point in plot.paper] == [(50.0, 0.3733)]
     shown = {number.row: number.paper for number in sections(by_distance())["errors"].numbers}
-    assert (shown["P(error ≤ 50 m)"], shown["recall@10 %"]) == (0.3733, 0.6462)
+    assert (shown["Placed within 50 m"], shown["True cell in the best 10 %"]) == (0.3733, 0.6462)
     assert sections(by_likelihood())["errors"].plots[0].paper == ()
 
 
@@ -183,3 +189,12 @@ def test_page_fits_the_screen_of_a_browser(
         assert all(name.startswith("data:") for name in browser.execute_script(names))
         assert_quiet(browser)
         assert Axe().run(browser)["violations"] == []
+
+
+def test_every_form_of_the_report_names_the_sources_of_the_data(tmp_path: Path) -> None:
+    report = evaluation_page(by_distance(), CITY, name="town")
+    assert CITY.licenses == ("World (CC0): world",)
+    write_report(report, tmp_path)
+    for name in ("report.html", "report.md", "report.json"):
+        assert "World (CC0): world" in (tmp_path / name).read_text("utf-8")
+    assert "Sources of the data" in (tmp_path / "report.html").read_text("utf-8")

@@ -78,6 +78,12 @@ def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
                 "cities are similar."
             ),
             (
+                "P(error ≤ 50 m) is the share of queries that are placed within 50 m of where they "
+                "were seen from, and recall@10 % the share whose true cell is among the best tenth "
+                "of all cells. Types are the classes of the objects that are seen, in their order, "
+                "and angles their directions."
+            ),
+            (
                 "Shares have intervals of 95 % (Wilson), which show the random error of the "
                 "sample of queries. Ties are scored by their expectation."
             ),
@@ -106,6 +112,7 @@ def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
             _likelihood_section(results),
         ),
         taxonomy=results.database.taxonomy,
+        credits=results.database.licenses,
         facts={"settings": dict(settings), "versions": dict(first.versions), "machine": machine()},
     )
 
@@ -198,7 +205,7 @@ def _database_section(results: Reproduction) -> Section:
             row = f"groups by {part}: {key}"
             numbers.append(Number(row, "", ours, paper=paper, decimals=decimals))
     for part, paper_share in (("type", paris.UNAMBIGUOUS), ("angle", None)):
-        row = f"cells alone in their group by {part}"
+        row = f"cells in a group of one, by {part}"
         ours = facts["groups"][part]["alone"]
         numbers.append(Number(row, "", ours, paper=paper_share, decimals=3))
     return _section(
@@ -206,7 +213,7 @@ def _database_section(results: Reproduction) -> Section:
         "Database",
         "Paper, Tables 2a and 2b. A group is all cells with the same sequence of types, or of "
         "angle levels. The paper's area is that of its city; ours is that of the cells. Its share "
-        "of cells alone in their group is that of its queries, by type or by angle.",
+        "of cells in a group of one is that of its queries, by type or by angle.",
         numbers=numbers,
     )
 
@@ -339,7 +346,7 @@ def _plots(
 def _unambiguous_section(results: Reproduction) -> Section:
     cases = {name: level_case(results, name) for name in DISTORTION_LEVELS}
     queries = Share.of(is_unambiguous(cases["medium"]).astype(np.float64))
-    numbers = [queries.number("queries", "share alone", paris.UNAMBIGUOUS)]
+    numbers = [queries.number("queries", "share in a group of one", paris.UNAMBIGUOUS)]
     for name, case in cases.items():
         for figure in (P50, RECALL10):
             share = share_of(case, figure, is_unambiguous(case))
