@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from benchmarks.street_photos import StreetPhoto
     from semsig_gis.database import City
 
-__all__ = ["answer_times", "photo_in", "serving"]
+__all__ = ["answer_times", "mark_object", "open_photo", "photo_in", "serving"]
 
 _TURNS = range(0, 360, 45)
 _PATIENCE_S = 60.0
@@ -91,31 +91,48 @@ def answer_times(
 
     The heading of the photo is given, with an error of ten degrees, or is unknown.
     """
+    heading = photo.heading if with_heading else None
+    open_photo(browser, address, photo.file, fov=photo.fov, heading=heading)
+    for symbol, box in photo.things[:marks]:
+        mark_object(browser, box, symbol, width=WIDTH)
+    return list(browser.execute_script(_TIMES))
+
+
+def open_photo(
+    browser: Chrome, address: str, file: Path, *, fov: float, heading: float | None
+) -> None:
+    """Open the workbench with a photo; None: its heading is unknown."""
     browser.get(address)
     _settle(browser)
-    browser.execute_script(_DROP, list(photo.file.read_bytes()), photo.file.name)
+    browser.execute_script(_DROP, list(file.read_bytes()), file.name)
     _settle(browser, with_photo=True)
-    browser.execute_script(_SLIDE, "fov", photo.fov)
-    if with_heading:
+    Select(browser.find_element(By.ID, "fov-known")).select_by_value("known")
+    browser.execute_script(_SLIDE, "fov", fov)
+    if heading is not None:
         Select(browser.find_element(By.ID, "heading-known")).select_by_value("known")
-        browser.execute_script(_SLIDE, "heading", photo.heading)
+        browser.execute_script(_SLIDE, "heading", heading)
     _settle(browser)
-    for symbol, (x_min, y_min, x_max, y_max) in photo.things[:marks]:
-        stage = browser.find_element(By.CSS_SELECTOR, _STAGE)
-        browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", stage)
-        size = stage.size
-        scale = size["width"] / WIDTH
-        x, y = (
-            round(corner * scale - size[side] / 2)
-            for corner, side in ((x_min, "width"), (y_min, "height"))
-        )
-        wide, high = (max(round(edge * scale), 9) for edge in (x_max - x_min, y_max - y_min))
-        chain = ActionChains(browser, duration=0)
-        chain.move_to_element_with_offset(stage, x, y).click_and_hold()
-        chain.move_by_offset(wide, high).release().perform()
-        ActionChains(browser).send_keys(symbol).perform()
-        _settle(browser)
-    return list(browser.execute_script(_TIMES))
+
+
+def mark_object(
+    browser: Chrome, box: tuple[float, float, float, float], symbol: str, *, width: float
+) -> None:
+    """Draw a box on a photo, in pixels of a picture of that width, and press the key of a class."""
+    x_min, y_min, x_max, y_max = box
+    stage = browser.find_element(By.CSS_SELECTOR, _STAGE)
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", stage)
+    size = stage.size
+    scale = size["width"] / width
+    x, y = (
+        round(corner * scale - size[side] / 2)
+        for corner, side in ((x_min, "width"), (y_min, "height"))
+    )
+    wide, high = (max(round(edge * scale), 9) for edge in (x_max - x_min, y_max - y_min))
+    chain = ActionChains(browser, duration=0)
+    chain.move_to_element_with_offset(stage, x, y).click_and_hold()
+    chain.move_by_offset(wide, high).release().perform()
+    ActionChains(browser).send_keys(symbol).perform()
+    _settle(browser)
 
 
 def _settle(browser: Chrome, *, with_photo: bool = False) -> None:

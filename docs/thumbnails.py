@@ -37,15 +37,7 @@ def main() -> None:
             (page, IMAGES / f"gallery/{page.stem}.webp", THUMBNAIL_SIZE, THUMBNAIL_WIDTH)
             for page in sorted([*GALLERY.glob("*.html"), *GALLERY.glob("*.svg")])
         ]
-    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if chromium is None or driver is None:
-        sys.exit("Chromium and its driver are not on this machine.")
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    for switch in ("headless=new", "no-sandbox", "disable-dev-shm-usage", "hide-scrollbars"):
-        options.add_argument(f"--{switch}")
-    service = webdriver.ChromeService(executable_path=driver)
-    browser = webdriver.Chrome(options=options, service=service)
+    browser = open_browser(HERO_SIZE)
     for page, target, (across, down), width in pages:
         screen = {"width": across, "height": down, "deviceScaleFactor": 1, "mobile": False}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
@@ -57,6 +49,20 @@ def main() -> None:
         picture.resize((width, height), Image.Resampling.LANCZOS).save(target, quality=QUALITY)
         print(f"{target.relative_to(DOCS)}: {target.stat().st_size / 1000:.0f} kB")  # noqa: T201
     browser.quit()
+
+
+def open_browser(size: tuple[int, int]) -> webdriver.Chrome:
+    """Open Chromium with a window of a size in pixels."""
+    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if chromium is None or driver is None:
+        sys.exit("Chromium and its driver are not on this machine.")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for switch in ("headless=new", "no-sandbox", "disable-dev-shm-usage", "hide-scrollbars"):
+        options.add_argument(f"--{switch}")
+    options.add_argument("--window-size={},{}".format(*size))
+    service = webdriver.ChromeService(executable_path=driver)
+    return webdriver.Chrome(options=options, service=service)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,107 @@
+"""Take the pictures of `from_photo.md` and of the workbench: ``python docs/photo_pictures.py``.
+
+A photo is drawn from a place of a made-up town, opened in the workbench and marked there.
+"""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PIL import Image
+from street_view import draw_view
+from thumbnails import open_browser
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import semsig_gis as sg
+from benchmarks.workbench import mark_object, open_photo, serving
+
+if TYPE_CHECKING:
+    from selenium.webdriver import Chrome
+    from street_view import Mark
+
+IMAGES = Path(__file__).resolve().parent / "images/from_photo"
+CELL, HEADING, FOV = 1386, 60.0, 75.0
+MARKED = ("bike_station", "bus_stop", "bench", "street_light", "street_light", "alignment_tree")
+SCREEN = 1400, 1000
+QUALITY = 72
+WIDTH = 900
+
+
+def main() -> None:
+    """Make the town, and take the pictures."""
+    IMAGES.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        town = Path(folder)
+        for command in (
+            ["synthesize", "--size", "1000", "--out", town / "town"],
+            ["build", town / "town/objects.parquet", "--out", town / "town.parquet"],
+        ):
+            subprocess.run(["semsig", *map(str, command)], check=True)  # noqa: S603, S607
+        city = sg.open_city(town / "town.parquet")
+        place = city.database.xy[CELL] + np.array([2.0, -1.5])  # as nobody stands in a centre
+        photo, marks = draw_view(
+            city.store.objects, city.store.footprints, place, heading=HEADING, fov=FOV
+        )
+        save(photo, "photo")
+        file = town / "street.jpg"
+        photo.save(file, quality=90)
+        browser = open_browser(SCREEN)
+        with serving(city) as address:
+            open_photo(browser, address, file, fov=FOV, heading=None)
+            symbols = {item.name: item.symbol for item in city.database.taxonomy.classes}
+            for mark in chosen(marks):
+                mark_object(browser, mark.box, symbols[mark.name], width=photo.width)
+            save(screenshot(browser), "workbench")
+            for name, selector in (
+                ("marks", "#scene"),
+                ("wheels", "#wheels"),
+                ("place", "#map"),
+                ("question", "#question"),
+            ):
+                save(element(browser, selector), name)
+        browser.quit()
+
+
+def chosen(marks: list[Mark]) -> list[Mark]:
+    """Return the largest objects of each class that a person marks."""
+    names = list(MARKED)
+    result = []
+    for mark in sorted(marks, key=lambda mark: mark.box[1] - mark.box[3]):
+        if mark.name in names:
+            names.remove(mark.name)
+            result.append(mark)
+    return result
+
+
+def screenshot(browser: Chrome) -> Image.Image:
+    """Return a picture of the window."""
+    browser.execute_script("scroll(0, 0)")
+    return Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB")
+
+
+def element(browser: Chrome, selector: str) -> Image.Image:
+    """Return a picture of an element."""
+    found = browser.find_element("css selector", selector)
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", found)
+    return Image.open(io.BytesIO(found.screenshot_as_png)).convert("RGB")
+
+
+def save(picture: Image.Image, name: str) -> None:
+    """Save a picture, at most as wide as the text."""
+    file = IMAGES / f"{name}.webp"
+    if picture.width > WIDTH:
+        height = round(picture.height * WIDTH / picture.width)
+        picture = picture.resize((WIDTH, height), Image.Resampling.LANCZOS)
+    picture.save(file, quality=QUALITY)
+    print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()
