@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
 from benchmarks.street_photos import WIDTH, street_photo
@@ -50,6 +51,7 @@ const slider = document.getElementById(arguments[0]);
 slider.value = arguments[1];
 slider.dispatchEvent(new Event("input"));
 """
+_TITLE = "return semsig.session.city.classes.find((item) => item.symbol === arguments[0]).title"
 _TIMES = "return performance.getEntriesByName('semsig-answer').map((entry) => entry.duration)"
 
 
@@ -117,7 +119,7 @@ def open_photo(
 def mark_object(
     browser: Chrome, box: tuple[float, float, float, float], symbol: str, *, width: float
 ) -> None:
-    """Draw a box on a photo, in pixels of a picture of that width, and press the key of a class."""
+    """Draw a box on a photo, in pixels of a picture of that width, and type its class."""
     x_min, y_min, x_max, y_max = box
     stage = browser.find_element(By.CSS_SELECTOR, _STAGE)
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", stage)
@@ -131,7 +133,8 @@ def mark_object(
     chain = ActionChains(browser, duration=0)
     chain.move_to_element_with_offset(stage, x, y).click_and_hold()
     chain.move_by_offset(wide, high).release().perform()
-    ActionChains(browser).send_keys(symbol).perform()
+    title = browser.execute_script(_TITLE, symbol)
+    ActionChains(browser).send_keys(title, Keys.ENTER).perform()
     _settle(browser)
 
 

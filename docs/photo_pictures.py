@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
+from selenium.webdriver.support.expected_conditions import presence_of_element_located
+from selenium.webdriver.support.ui import WebDriverWait
 from street_view import draw_view
 from thumbnails import open_browser
 
@@ -26,17 +28,20 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
     from street_view import Mark
 
-IMAGES = Path(__file__).resolve().parent / "images/from_photo"
+IMAGES = Path(__file__).resolve().parent / "images"
+STEPS = IMAGES / "from_photo"
 CELL, HEADING, FOV = 1386, 60.0, 75.0
 MARKED = ("bike_station", "bus_stop", "bench", "street_light", "street_light", "alignment_tree")
+DOUBTFUL = 2  # marks that are not enough for an answer
 SCREEN = 1400, 1000
 QUALITY = 72
+PATIENCE_S = 60
 WIDTH = 900
 
 
 def main() -> None:
     """Make the town, and take the pictures."""
-    IMAGES.mkdir(exist_ok=True)
+    STEPS.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         town = Path(folder)
         for command in (
@@ -49,23 +54,25 @@ def main() -> None:
         photo, marks = draw_view(
             city.store.objects, city.store.footprints, place, heading=HEADING, fov=FOV
         )
-        save(photo, "photo")
+        save(photo, STEPS / "photo.webp")
         file = town / "street.jpg"
         photo.save(file, quality=90)
         browser = open_browser(SCREEN)
         with serving(city) as address:
             open_photo(browser, address, file, fov=FOV, heading=None)
             symbols = {item.name: item.symbol for item in city.database.taxonomy.classes}
-            for mark in chosen(marks):
+            things = chosen(marks)
+            for mark in things[:DOUBTFUL]:
                 mark_object(browser, mark.box, symbols[mark.name], width=photo.width)
-            save(screenshot(browser), "workbench")
-            for name, selector in (
-                ("marks", "#scene"),
-                ("wheels", "#wheels"),
-                ("place", "#map"),
-                ("question", "#question"),
-            ):
-                save(element(browser, selector), name)
+            save(
+                below(element(browser, "#answer"), element(browser, "#question")),
+                STEPS / "question.webp",
+            )
+            for mark in things[DOUBTFUL:]:
+                mark_object(browser, mark.box, symbols[mark.name], width=photo.width)
+            save(screenshot(browser), IMAGES / "workbench.webp")
+            for name, selector in (("marks", "#scene"), ("wheels", "#wheels"), ("place", "#map")):
+                save(element(browser, selector), STEPS / f"{name}.webp")
         browser.quit()
 
 
@@ -93,9 +100,18 @@ def element(browser: Chrome, selector: str) -> Image.Image:
     return Image.open(io.BytesIO(found.screenshot_as_png)).convert("RGB")
 
 
-def save(picture: Image.Image, name: str) -> None:
+def below(*pictures: Image.Image) -> Image.Image:
+    """Return pictures one below the other."""
+    width, height = (max(picture.width for picture in pictures), sum(p.height for p in pictures))
+    result, top = Image.new("RGB", (width, height), "white"), 0
+    for picture in pictures:
+        result.paste(picture, (0, top))
+        top += picture.height
+    return result
+
+
+def save(picture: Image.Image, file: Path) -> None:
     """Save a picture, at most as wide as the text."""
-    file = IMAGES / f"{name}.webp"
     if picture.width > WIDTH:
         height = round(picture.height * WIDTH / picture.width)
         picture = picture.resize((WIDTH, height), Image.Resampling.LANCZOS)

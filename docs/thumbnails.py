@@ -1,12 +1,10 @@
 """Take the pictures of maps that the site shows, in Chromium: ``python docs/thumbnails.py``.
 
-By default, these are the pictures of the gallery that ``make docs`` wrote. ``--hero MAP`` takes the
-picture of the first page instead: a map of Montpellier by ``semsig map city.parquet --ambiguity``.
+These are the pictures of the gallery that ``make docs`` wrote.
 """
 
 from __future__ import annotations
 
-import argparse
 import io
 import shutil
 import sys
@@ -17,36 +15,25 @@ from PIL import Image
 from selenium import webdriver
 
 DOCS = Path(__file__).resolve().parent
-GALLERY, IMAGES = DOCS / "_build/html/gallery", DOCS / "images"
-HERO = IMAGES / "hero.webp"
-HERO_SIZE, THUMBNAIL_SIZE = (1280, 640), (900, 600)
-THUMBNAIL_WIDTH = 450
+GALLERY, THUMBNAILS = DOCS / "_build/html/gallery", DOCS / "images/gallery"
+SIZE, WIDTH = (900, 600), 450
 QUALITY = 72
 SETTLED_S = 4.0  # until all animations have ended
 
 
 def main() -> None:
-    """Read the options, and take the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--hero", type=Path, metavar="MAP")
-    hero = parser.parse_args().hero
-    if hero is not None:
-        pages = [(hero, HERO, HERO_SIZE, HERO_SIZE[0])]
-    else:
-        pages = [
-            (page, IMAGES / f"gallery/{page.stem}.webp", THUMBNAIL_SIZE, THUMBNAIL_WIDTH)
-            for page in sorted([*GALLERY.glob("*.html"), *GALLERY.glob("*.svg")])
-        ]
-    browser = open_browser(HERO_SIZE)
-    for page, target, (across, down), width in pages:
-        screen = {"width": across, "height": down, "deviceScaleFactor": 1, "mobile": False}
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+    """Take the pictures."""
+    THUMBNAILS.mkdir(exist_ok=True)
+    browser = open_browser(SIZE)
+    screen = {"width": SIZE[0], "height": SIZE[1], "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+    for page in sorted([*GALLERY.glob("*.html"), *GALLERY.glob("*.svg")]):
+        target = THUMBNAILS / f"{page.stem}.webp"
         browser.get(page.resolve().as_uri())
         time.sleep(SETTLED_S)
         picture = Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB")
-        height = round(picture.height * width / picture.width)
-        target.parent.mkdir(exist_ok=True)
-        picture.resize((width, height), Image.Resampling.LANCZOS).save(target, quality=QUALITY)
+        height = round(picture.height * WIDTH / picture.width)
+        picture.resize((WIDTH, height), Image.Resampling.LANCZOS).save(target, quality=QUALITY)
         print(f"{target.relative_to(DOCS)}: {target.stat().st_size / 1000:.0f} kB")  # noqa: T201
     browser.quit()
 
