@@ -64,6 +64,8 @@ def main() -> None:
             things = chosen(marks)
             for mark in things[:DOUBTFUL]:
                 mark_object(browser, mark.box, symbols[mark.name], width=photo.width)
+            question = "css selector", "#question b"
+            WebDriverWait(browser, PATIENCE_S).until(presence_of_element_located(question))
             save(
                 below(element(browser, "#answer"), element(browser, "#question")),
                 STEPS / "question.webp",
