@@ -22,15 +22,13 @@ def place_links(lat: float, lon: float, *, heading: float | None = None) -> dict
     Examples
     --------
     >>> place_links(43.7384, 7.4246, heading=90.0)["OpenStreetMap"]
-    'https://www.openstreetmap.org/?mlat=43.738400&mlon=7.424600#map=19/43.738400/7.424600'
+    'https://www.openstreetmap.org/?mlat=43.73840&mlon=7.42460&zoom=19'
     """
     latitude, longitude = f"{lat:.6f}", f"{lon:.6f}"
     look = "" if heading is None else f"&heading={round(heading) % 360}"
     place = f"{latitude}/{longitude}"
     return {
-        "OpenStreetMap": (
-            f"https://www.openstreetmap.org/?mlat={latitude}&mlon={longitude}#map=19/{place}"
-        ),
+        "OpenStreetMap": (f"https://www.openstreetmap.org/?mlat={lat:.5f}&mlon={lon:.5f}&zoom=19"),
         "Google Street View": (
             "https://www.google.com/maps/@?api=1&map_action=pano"
             f"&viewpoint={latitude},{longitude}{look}"

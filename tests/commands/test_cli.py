@@ -174,6 +174,7 @@ def test_sources_lists_catalogues(run_ok: RunOk, monkeypatch: pytest.MonkeyPatch
     assert "Classes: " in out
     assert "secret" not in out
     assert "osm_file" in listed["readers"]
+    monkeypatch.setenv("COLUMNS", "400")  # no text is wrapped
     for line, words in {
         "sources": ("montpellier",),
         "sources openstreetmap": ("highway=street_lamp", "clocks (optional)", "level = <0"),

@@ -79,6 +79,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
                 )
                 for item in report.conflated
             ),
+            minor=("radius, m",),
         ),
         Table(
             "Place",
@@ -103,7 +104,7 @@ def _class_table(report: QualityReport) -> Table:
         ("class", "objects", "rows", "per km² of hull", "per km² occupied", "nearest, m"),
         tuple(
             (
-                *(item.title, f"{item.objects:,}", f"{item.rows:,}"),
+                *(item.title.lower(), f"{item.objects:,}", f"{item.rows:,}"),
                 *map(_decimal_text, (item.per_km2_hull, item.per_km2_occupied, item.nearest_m)),
             )
             for item in report.classes
@@ -134,6 +135,7 @@ def _layer_table(report: QualityReport) -> Table:
             for item, count in zip(report.sources, counts, strict=True)
         ),
         note=f"0 in all layers: {', '.join(empty)}." if empty else "",
+        minor=tuple(columns[1:]),
     )
 
 
