@@ -139,3 +139,10 @@ def test_changes_are_drawn(run: Run) -> None:
     code, _, err = run(line)
     assert (code, "drawing cells only" in err) == (0, True)
     assert "Objects removed" not in Path("drift.html").read_text(encoding="utf-8")
+
+
+def test_tiles_that_pages_from_disk_do_not_get_are_named(run: Run) -> None:
+    for tiles, refused in (("OpenStreetMap.Mapnik", True), ("CyclOSM", False)):
+        code, _, remarks = run(f"map city.parquet --ambiguity --tiles {tiles} --out map.html")
+        assert code == 0
+        assert ("pages that are opened from disk" in " ".join(remarks.split())) == refused

@@ -20,7 +20,6 @@ from semsig_gis.core import (
     InputError,
     mixed,
     percent,
-    place_links,
 )
 from semsig_gis.database import require_same_place, rows_of_result
 from semsig_gis.localization import DEFAULT_RULE
@@ -242,7 +241,6 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
         "title": title,
         "where": bool(where),
         "lines": lines,
-        "links": place_links(*best),
         "rays": sorted(rays, key=lambda ray: ORDER.index(ray["verdict"])),
         "more": more,
         "facts": [fact for fact in facts if fact[1] is not None],

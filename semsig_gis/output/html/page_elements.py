@@ -27,6 +27,7 @@ from semsig_gis.core import (
     across_180,
     class_signs,
     nearest_name,
+    place_links,
     to_degrees,
 )
 from semsig_gis.database import SignatureDatabase
@@ -57,6 +58,7 @@ PAGE_FILES = (
     "answer.js",
 )
 TILES_WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
+ANY_PLACE = (12.345678, 98.765432)  # in links, which the script replaces by another place
 AREA_DEGREE = 4  # of the polynomial from x, y to degrees; exact to millimetres in a city
 AREA_LATTICE = 9  # points a side from which the polynomial is fitted
 
@@ -164,7 +166,9 @@ class PageControls(Call):
         names: tuple[str, ...],
         first: str | None,
     ) -> None:
-        super().__init__("addControls", map_, layers, area, names, first)
+        links = [[title, address] for title, address in place_links(*ANY_PLACE).items()]
+        about = {"credits": names, "first": first, "links": links, "at": ANY_PLACE}
+        super().__init__("addControls", map_, layers, area, about)
         self.area, self.names, self.first = area, names, first
 
 

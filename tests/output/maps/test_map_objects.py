@@ -18,7 +18,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from worlds import random_town
 
-from semsig_gis.core import Taxonomy, class_signs
+from semsig_gis.core import Taxonomy, class_signs, place_links
 from semsig_gis.localization import Method, localize
 from semsig_gis.objects import Licence, StreetObjects
 from semsig_gis.output import ground_map, localization_map, objects_map, page_of_map, to_latlon
@@ -365,3 +365,27 @@ def test_search_finds_streets_by_name(page: MapPage) -> None:
     page.panel()
     assert page.text(".semsig-panel h2") == HOSTILE
     page.assert_text_stays_text()
+
+
+def test_streets_are_labelled_with_their_names(page: MapPage) -> None:
+    """Pieces of a street are joined, so that there is room for its name."""
+    east, north = 565_000.0, 4_830_000.0
+    pieces = [
+        shapely.LineString([(east + 20.0 * at, north), (east + 20.0 * (at + 1), north)])
+        for at in range(10)
+    ]
+    colour, canvas = "#4a4f55", ".semsig-names"
+    for names, labelled in ((["Rue Longue"] * 10, True), ([None] * 10, False)):
+        streets = gpd.GeoDataFrame({"name": names}, geometry=pieces, crs="EPSG:32631")
+        page.open(ground_map(streets=streets))
+        for zoom, near in ((18, True), (14, False)):
+            page.ask("map.setZoom(arguments[0], {animate: false})", zoom)
+            assert (page.drawn(colour, canvas) > 0) == (labelled and near)
+
+
+def test_every_panel_links_to_public_maps(page: MapPage) -> None:
+    page.open(objects_map(OBJECTS))
+    page.click_at([43.6, 3.9])
+    assert page.panel()
+    links = {link.text: link.get_attribute("href") for link in page.all(".semsig-links a")}
+    assert links == place_links(43.6, 3.9)

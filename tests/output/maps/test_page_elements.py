@@ -108,7 +108,8 @@ def test_tiles_are_for_new_maps_only(name: str) -> None:
     assert "tile.openstreetmap.org" in body
     assert "contributors" in body
     layers = layers_of(draw(tiles="CyclOSM")).values()
-    assert sum(isinstance(layer, folium.TileLayer) for layer in layers) == 1
+    tiles = [layer for layer in layers if isinstance(layer, folium.TileLayer)]
+    assert [layer.layer_name for layer in tiles] == ["Online map: CyclOSM"]
     with refused(InputError, "OpenStreetMap"):
         draw(tiles="OpenStreetMap", map_=folium.Map(tiles=None))
 

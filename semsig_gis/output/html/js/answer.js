@@ -139,12 +139,7 @@ semsig.answerObjects = (about, signs) => {
     about.lines.forEach((line, at) => {
       semsig.text(box, "p", line).className = about.where && at === 0 ? "semsig-where" : "";
     });
-    const links = L.DomUtil.create("p", "semsig-links", box);
-    links.append("Look there: ");
-    for (const [title, address] of Object.entries(about.links)) {
-      const link = semsig.text(links, "a", title);
-      Object.assign(link, {href: address, target: "_blank", rel: "noopener noreferrer"});
-    }
+    box.append(semsig.links(map, L.latLng(about.best)));
     const table = L.DomUtil.create("table", "semsig-said", box);
     const head = L.DomUtil.create("tr", "", L.DomUtil.create("thead", "", table));
     for (const text of ["You said", "Is there"]) {

@@ -144,7 +144,11 @@ semsig.fitView = (map) => {
     maxZoom: zoom, animate: false,
   });
 };
-semsig.addControls = (map, layers, area, credits, first) => {
+semsig.addControls = (map, layers, area, {credits, first, links, at}) => {
+  // Addresses of public maps and photographs of a place; nothing is requested before a click.
+  map.semsigLinks = (place) => links.map(([title, address]) => [title, at.reduce(
+    (text, degrees, part) => text.replaceAll(degrees.toFixed(6), place[part].toFixed(6)),
+    address)]);
   map.attributionControl?.setPrefix(false);
   for (const credit of map.attributionControl ? credits : []) {
     // In an element of its own, so that its text direction does not change other text.

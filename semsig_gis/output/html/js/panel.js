@@ -90,6 +90,17 @@ semsig.uncover = (map) => {
   const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
   if (offset.x || offset.y) map.panBy(offset, {animate: !still});
 };
+// Links to a place in public maps and photographs.
+semsig.links = (map, {lat, lng}) => {
+  const line = L.DomUtil.create("p", "semsig-links");
+  line.append("Look there: ");
+  for (const [title, address] of map.semsigLinks([lat, lng])) {
+    const link = semsig.text(line, "a", title);
+    Object.assign(link, {href: address, target: "_blank", rel: "noopener noreferrer"});
+    line.append(" ");
+  }
+  return line;
+};
 // Opens the panel for a place. `corners` should be in view as well, `drawn` stays on the map while
 // the panel is open, and `key` restores the panel from the address.
 semsig.show = (map, box, place, {corners, key = null, drawn} = {}) => {
@@ -100,6 +111,9 @@ semsig.show = (map, box, place, {corners, key = null, drawn} = {}) => {
   const layers = [drawn, lights].filter(Boolean);
   state.selection = {place: L.latLng(place), corners, key, layers};
   for (const layer of layers) layer.addTo(map);
+  if (map.semsigLinks && !box.querySelector(".semsig-links")) {
+    box.append(semsig.links(map, state.selection.place));
+  }
   const title = box.querySelector("h2");
   state.panel.replaceChildren(semsig.panelHead(map, state.panel, title), box);
   map.getContainer().classList.add("semsig-panel-open");
