@@ -272,8 +272,9 @@ class Localize(SearchOptions, QueryOptions):
                 north=north,
             )
 
-        # The map shows the objects of the best place, too.
-        explain = self.explain or self.map is not None
+        # The map shows the objects of the best place too, if they have bearings.
+        placed = query is not None and query.bearings is not None
+        explain = self.explain or (self.map is not None and placed)
 
         def make(noise: str) -> LikelihoodLocator:
             return self.locator(

@@ -40,7 +40,7 @@ def save_city(**ground: gpd.GeoDataFrame) -> None:
 
 def map_page(run_ok: RunOk, options: str) -> str:
     """Return the page of a map."""
-    assert run_ok(f"map city.parquet {options} --out map.html") == "map: map.html\n"
+    assert run_ok(f"map city.parquet {options} --out map.html").endswith("map: map.html\n")
     return Path("map.html").read_text(encoding="utf-8")
 
 
@@ -132,7 +132,8 @@ def test_changes_are_drawn(run: Run) -> None:
     save_with_store(build_database(FEWER), ObjectStore.of(FEWER), "new.parquet")
     line = "map city.parquet --drift new.parquet --out drift.html"
     code, out, err = run(line)
-    assert (code, out, "drawing cells only" in err) == (0, "map: drift.html\n", False)
+    assert (code, "drawing cells only" in err) == (0, False)
+    assert out.endswith("map: drift.html\n")
     assert "Objects removed (4)" in Path("drift.html").read_text(encoding="utf-8")
     # Without its store, a database has cells to compare, but no objects.
     Path("new.objects").rename("elsewhere")
@@ -146,3 +147,12 @@ def test_tiles_that_pages_from_disk_do_not_get_are_named(run: Run) -> None:
         code, _, remarks = run(f"map city.parquet --ambiguity --tiles {tiles} --out map.html")
         assert code == 0
         assert ("pages that are opened from disk" in " ".join(remarks.split())) == refused
+
+
+def test_map_of_an_answer_compares_without_being_asked(run_ok: RunOk) -> None:
+    for seen, compared in (("--types DD --bearings 10,80", True), ("--types DD", False)):
+        text = run_ok(f"localize city.parquet {seen} --map query.html --json")
+        assert "explanation" not in text
+        page = Path("query.html").read_text(encoding="utf-8")
+        assert '"answerObjects"' in page
+        assert ('"verdict":"matched"' in page) == compared
