@@ -28,10 +28,11 @@ from semsig_gis.database.file import (
 )
 from semsig_gis.database.store import (
     BUILT_DIGEST,
+    SQUARE_M,
     built_digest,
     current_store,
     file_state,
-    names_around,
+    names_in,
     open_store,
 )
 from semsig_gis.storage import read_geoparquet, whole_folder, write_geoparquet
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from semsig_gis.core import Axes, MapFrame
     from semsig_gis.database.database import CellGeometry, SignatureDatabase
     from semsig_gis.database.file import PartitionedDatabase
+    from semsig_gis.database.place_names import PlaceNames
     from semsig_gis.database.store import ObjectStore
     from semsig_gis.objects import StreetObjects
 
@@ -80,6 +82,7 @@ class City(Displayed):
     def __init__(self, path: str | Path | None = None) -> None:
         self._path = None if path is None else Path(path)
         self._read_state: tuple[int, ...] | None = None
+        self._names: dict[tuple[int, int], PlaceNames] = {}
 
     def _facts(self) -> dict[str, object]:
         file = "none, in memory" if self._path is None else self._path
@@ -176,9 +179,12 @@ class City(Displayed):
         Of a database in parts, only what is near the place is read.
         """
         try:
-            if self._in_parts and "store" not in vars(self):
-                return names_around(self.path, (x, y)).of(x, y)
-            return self.store.place_name(x, y)
+            if not self._in_parts or "store" in vars(self):
+                return self.store.place_name(x, y)
+            square = int(x // SQUARE_M), int(y // SQUARE_M)
+            if square not in self._names:
+                self._names[square] = names_in(self.path, square)
+            return self._names[square].of(x, y)
         except DatabaseError:
             return ""
 

@@ -77,6 +77,7 @@ OBJECTS = "objects.parquet"
 FOOTPRINTS = "footprints.parquet"
 STREETS = "streets.parquet"
 BUILT_DIGEST = "built_digest"
+SQUARE_M = 1000.0  # of a city in parts, for which names are read together
 NEXT = ".next"  # suffix of a new store until its database is in place
 
 
@@ -389,13 +390,16 @@ def _read_inputs(folder: Path) -> ObjectStore:
     return ObjectStore.of(objects, footprints=houses, streets=lines)
 
 
-def names_around(folder: Path, xy: tuple[float, float]) -> PlaceNames:
-    """Return the names around a place in metres, from the inputs of a database in parts."""
+def names_in(folder: Path, square: tuple[int, int]) -> PlaceNames:
+    """Return the names for places in a square, from the inputs of a database in parts.
+
+    The square of `SQUARE_M` is numbered by its column and row from the origin of the CRS.
+    """
     files = stored_inputs(folder)
     crs = open_objects(files.pop("objects"), box=EMPTY_BOX).crs
-    x, y = xy
-    box = (x - FAR_M, y - FAR_M, x + FAR_M, y + FAR_M)
-    houses, lines = _read_ground(files, crs, box)
+    west, south = (SQUARE_M * number for number in square)
+    east, north = west + SQUARE_M + FAR_M, south + SQUARE_M + FAR_M
+    houses, lines = _read_ground(files, crs, (west - FAR_M, south - FAR_M, east, north))
     return PlaceNames(lines, houses)
 
 

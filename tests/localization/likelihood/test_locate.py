@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -252,11 +253,16 @@ def test_buildings_hide_objects_behind_them() -> None:
     east, north = PLACE.tolist()
     wall = shapely.box(east + 4.0, north - 40.0, east + 8.0, north + 40.0)
     houses = gpd.GeoDataFrame(geometry=[wall], crs="EPSG:2154")
-    stores = STORE, ObjectStore.of(WORLD.street_objects, footprints=houses)
-    free, walled = (
-        locate(WIDE, seen_from(PLACE), store=store, refined=True, explained=1).explanations[0]
-        for store in stores
+    built_with = build_index(replace(CITY, occlusion=0.5), cell_noise(named_noise("generic"), 10.0))
+    store = ObjectStore.of(WORLD.street_objects, footprints=houses)
+    free, drawn, walled = (
+        locate(index, seen_from(PLACE), store=store, refined=True, explained=1).explanations[0]
+        for index, store in ((WIDE, STORE), (WIDE, store), (built_with, store))
     )
+    assert (drawn.xy, drawn.loglik) == (
+        free.xy,
+        free.loglik,
+    )  # of a database without buildings, they are only drawn
     assert math.dist(free.xy, PLACE) < 1.0
     assert math.dist(walled.xy, PLACE) > 3.0  # half of the query would be hidden here
     assert walled.loglik < free.loglik - 3.0
