@@ -17,6 +17,7 @@ from semsig_gis.commands.options import (
     NorthName,
     Objects,
     adapted_noise,
+    noises,
     north_sigma,
     object_store,
     query_north,
@@ -77,6 +78,7 @@ class Learn:
             title="First noise model",
             metavar="NAME|FILE",
             reads=True,
+            suggestions=noises,
             advanced=True,
         ),
     ] = "photo"

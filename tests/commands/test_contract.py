@@ -148,7 +148,8 @@ def test_input_is_not_overwritten(name: str, field: Field, run: Run) -> None:
     ("name", "field"), fields(lambda field: field.choices or field.option.suggestions)
 )
 def test_unknown_name_is_refused(name: str, field: Field, run: Run) -> None:
-    sentence(run("", *line_of(name, **{field.name: "nothing"})), "nothing")
+    changes, _ = OTHERS.get((name, field.name), ({}, ""))
+    sentence(run("", *line_of(name, **{field.name: "nothing"}, **changes)), "nothing")
 
 
 @pytest.mark.usefixtures("city")
