@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FIGURES = {
     **{f"p{metres}": f"Placed within {metres} m" for metres in ERROR_BREAKS},
     **{f"recall{share}": f"True cell in the best {share} %" for share in (1, 10)},
-    **{f"near{count}": f"Within {NEAR_METRES} m: one of {count} places" for count in NEAR_PLACES},
+    **{f"near{count}": f"Within {NEAR_METRES} m, best of {count}" for count in NEAR_PLACES},
     "coverage": f"Answered, with a chance of {DEFAULT_RULE.threshold:g} or more",
     "precision": "Right answers, of these",
     "in_region": "True cell in the region of 90 %",
