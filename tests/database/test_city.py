@@ -324,7 +324,7 @@ def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path
     assert again.footprints.crs == again.streets.crs == TOWN.crs
     # To the last bit, because updates compute sight lines with them.
     assert again.footprints.geometry.tolist() == houses.to_crs(TOWN.crs).geometry.tolist()[:1]
-    assert again.footprints.columns.tolist() == ["geometry"]
+    assert again.footprints.columns.tolist() == ["name", "geometry"]
     assert again.footprints.attrs["licenses"] == ["City (CC0): houses"]
     licenses = open_database(tmp_path / "city.parquet").licenses
     assert licenses == (*map(str, TOWN.licenses), "City (CC0): houses")

@@ -96,6 +96,9 @@ def test_queries_do_not_depend_on_their_number_seeds_and_parts(seen_from: SeenFr
     assert [item[:4] for item in plain] == [item[:4] for item in whole]
 
 
+BUILT_UP = replace(DATABASE, occlusion=0.5)  # as if it had been built with buildings
+
+
 def store_with(*houses: shapely.Polygon) -> ObjectStore:
     footprints = gpd.GeoDataFrame(geometry=list(houses), crs="EPSG:2154")
     return ObjectStore.of(TOWN.street_objects, footprints=footprints)
@@ -104,7 +107,7 @@ def store_with(*houses: shapely.Polygon) -> ObjectStore:
 def test_places_are_outside_buildings() -> None:
     x, y = CORNER
     house = shapely.box(x + 20, y + 20, x + 146, y + 150)  # it ends within cells
-    queries = draw_queries(DATABASE, replace(ANYWHERE, number=150), store=store_with(house))
+    queries = draw_queries(BUILT_UP, replace(ANYWHERE, number=150), store=store_with(house))
     places = [shapely.Point(query.xy) for query in queries]
     assert not any(house.intersects(place) for place in places)
     assert any(house.distance(place) < 5.0 for place in places)
@@ -118,7 +121,7 @@ def test_more_queries_than_places_outside_are_refused() -> None:
     x, y = CORNER
     house = shapely.box(x - 100, y - 100, x + 300, y + 195)
     with refused(InputError, "200 queries", "outside the buildings", "smaller number"):
-        draw_queries(DATABASE, replace(ANYWHERE, number=200), store=store_with(house))
+        draw_queries(BUILT_UP, replace(ANYWHERE, number=200), store=store_with(house))
 
 
 def row_of(city: SignatureDatabase, query: SimulatedQuery) -> int:
