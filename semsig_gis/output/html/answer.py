@@ -539,6 +539,10 @@ def answer_map(
     signs = _ranked_points("Region", middles, REGION_FORM, REGION_NAMES, CHANCES[0.9])
     parts = [["lines", [[REGION, lines]]], signs]
     add_layer(page, f"Regions to search ({len(regions):,})", "drawings", parts, group="answer")
+    if "types" in candidates:
+        classes = database.taxonomy
+        words = [classes.words(classes.encode(types or "")) for types in candidates["types"]]
+        candidates = candidates.assign(types=words)
     if len(candidates):
         points = _ranked_points("Rank", candidates, CANDIDATE_FORM, LISTED_NAMES, CANDIDATE)
         add_layer(page, f"Candidates ({len(candidates):,})", *points, group="answer")

@@ -98,7 +98,7 @@ def test_legend_and_list_of_layers_count_what_is_selected(filters_page: MapPage)
     counts = [f"{count} of {total}" for count, total in
               zip(np.bincount(FAILED[seen], minlength=2), totals, strict=True)]  # fmt: skip
     assert numbers() == counts
-    labels = [label for label in filters_page.layers() if "queries" in label]
+    labels = [label for label in filters_page.layers() if "queries (" in label]
     assert labels[:2] == [f"Successful queries ({counts[0]})", f"Failed queries ({counts[1]})"]
     text = filters_page.text(".semsig-selected")
     assert f"Selected: {seen.sum()} of {len(seen)} queries" in text

@@ -146,9 +146,10 @@ semsig.fitView = (map) => {
 };
 semsig.addControls = (map, layers, area, {credits, first, links, at}) => {
   // Addresses of public maps and photographs of a place; nothing is requested before a click.
-  map.semsigLinks = (place) => links.map(([title, address]) => [title, at.reduce(
-    (text, degrees, part) => text.replaceAll(degrees.toFixed(6), place[part].toFixed(6)),
-    address)]);
+  // They are written with five or six decimals.
+  map.semsigLinks = (place) => links.map(([title, address]) => [title, [6, 5].reduce(
+    (whole, digits) => at.reduce((text, degrees, part) =>
+      text.replaceAll(degrees.toFixed(digits), place[part].toFixed(digits)), whole), address)]);
   map.attributionControl?.setPrefix(false);
   for (const credit of map.attributionControl ? credits : []) {
     // In an element of its own, so that its text direction does not change other text.

@@ -131,7 +131,10 @@ semsig.ground = (packed, about) => {
     [ctx.strokeStyle, ctx.fillStyle] = dark ? ["#131518", "#bcc0c5"] : ["#fcfcfa", "#4a4f55"];
     const taken = [];
     data.called.forEach((name, shape) => {
-      if (name < 0) return;
+      const [west, south, east, north] = data.shapes.subarray(4 * shape, 4 * shape + 4);
+      if (name < 0 || east * scale + left < min.x || west * scale + left > max.x
+        || top - south * scale < min.y || top - north * scale > max.y) return;
+      if ((east - west + north - south) * scale < 30) return;  // no room for a name
       const [from, to] = [data.firsts[shape], data.firsts[shape + 1]];
       const text = data.names[name];
       const wide = ctx.measureText(text).width;
