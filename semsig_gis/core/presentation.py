@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from semsig_gis.core.display import Axes, MapFrame
 
@@ -31,6 +31,12 @@ def export_with(name: str, *results: object, **options: Any) -> Any:  # noqa: AN
     return _loaders[0](name)(*results, **options)
 
 
-def map_with(name: str, *results: object) -> MapFrame:
-    """Return the map by the public function `name` of results, to show in a notebook."""
-    return _loaders[0]("show_map")(_loaders[0](name)(*results))
+def map_with(name: str, *results: object, ground: Mapping[str, Any] | None = None) -> MapFrame:
+    """Return the map by the public function `name` of results, to show in a notebook.
+
+    `ground` are the arguments of `ground_map`, for streets and buildings below the results.
+    """
+    map_ = _loaders[0](name)(*results)
+    if ground:
+        _loaders[0]("ground_map")(**ground, map_=map_)
+    return _loaders[0]("show_map")(map_)

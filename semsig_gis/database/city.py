@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core import DatabaseError, Displayed, export_with
+from semsig_gis.core import DatabaseError, Displayed, export_with, map_with
 from semsig_gis.database.file import (
     INPUTS,
     KIND,
@@ -188,6 +188,13 @@ class City(Displayed):
         except DatabaseError:
             return ""
 
+    def ground_around(self, xy: NDArray[np.float64]) -> dict[str, Any]:
+        """Return the ground of cells as `ObjectStore.ground_around` does; empty without a store."""
+        try:
+            return self.store.ground_around(xy)
+        except DatabaseError:
+            return {}
+
     @property
     def object_counts(self) -> dict[int, int] | None:
         """Number of objects by class code; None if the store cannot be used."""
@@ -214,11 +221,13 @@ class City(Displayed):
 
     def explore(self) -> MapFrame:
         """Show the cells on a map in a notebook, by the number of cells with equal signatures."""
-        return self.database.explore()
+        ground = self.ground_around(self.database.xy)
+        return map_with("ambiguity_map", self.database, ground=ground)
 
     def export(self, path: str | Path) -> None:
         """Write the cells and the street objects in the format of a suffix (`export_database`)."""
-        export_with("export_database", self.database, path, objects=self.objects)
+        inputs = {} if self.objects is None else {"objects": self.objects, **self.store.ground}
+        export_with("export_database", self.database, path, **inputs)
 
     def columns(self, name: str) -> tuple[pa.Table, dict[str, Any]] | None:
         """Return the columns that were added to the database under a name, and their facts.

@@ -78,6 +78,7 @@ FOOTPRINTS = "footprints.parquet"
 STREETS = "streets.parquet"
 BUILT_DIGEST = "built_digest"
 SQUARE_M = 1000.0  # of a city in parts, for which names are read together
+GROUND_M = 100.0  # margin of the ground that is drawn around the cells
 NEXT = ".next"  # suffix of a new store until its database is in place
 
 
@@ -146,6 +147,17 @@ class ObjectStore(Displayed):
         """The ``buildings`` and the ``streets``, where there are some."""
         tables = {"buildings": self.footprints, "streets": self.streets}
         return {name: table for name, table in tables.items() if table is not None}
+
+    def ground_around(self, xy: NDArray[np.float64]) -> dict[str, Any]:
+        """Return the arguments of `ground_map` around places, (n, 2); empty without any ground."""
+        low, high = xy.min(axis=0) - GROUND_M, xy.max(axis=0) + GROUND_M
+        box = (*low.tolist(), *high.tolist())
+        tables = {
+            name: table
+            for name, table in self.ground.items()
+            if len(table.sindex.intersection(box))
+        }
+        return {**tables, "box": box} if tables else {}
 
     @cached_property
     def _names(self) -> PlaceNames:

@@ -26,7 +26,7 @@ from semsig_gis.core import (
 from semsig_gis.observation import GRID_NORTH, NorthRecord, View, ViewRecord
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     import geopandas as gpd
     import pandas as pd
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.core import Axes, Signature, Taxonomy
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database import City, ObjectStore, SignatureDatabase
     from semsig_gis.observation import North
 
 
@@ -98,8 +98,8 @@ class Answer(Displayed):
     ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint in `crs`), ``types``
     (symbols), ``length`` (objects) and columns of the method; `candidates` is a table of them.
     `cells` is the number of cells searched. `notes` are sentences on parts of the query that were
-    not used or look wrong. The bearings of `query` are measured from `north`. `place_name` returns
-    the name of a position in `crs`, if the streets are known.
+    not used or look wrong. The bearings of `query` are measured from `north`. `city`, if known,
+    names places by their streets and is drawn below the answer.
     """
 
     query: Signature
@@ -111,7 +111,7 @@ class Answer(Displayed):
     tied_beyond: int = 0
     notes: tuple[str, ...] = ()
     north: North = GRID_NORTH
-    place_name: Callable[[float, float], str] | None = None
+    city: City | ObjectStore | None = None
 
     @property
     @abstractmethod
@@ -121,7 +121,7 @@ class Answer(Displayed):
     @cached_property
     def place(self) -> str:
         """The best place in words: ``on High Street, near Town Hall``; empty if unknown."""
-        return "" if self.place_name is None else self.place_name(*self.xy)
+        return "" if self.city is None else self.city.place_name(*self.xy)
 
     @cached_property
     def latlon(self) -> tuple[float, float]:

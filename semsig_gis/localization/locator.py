@@ -144,12 +144,12 @@ def make_locator(
     """Return the locator of a method.
 
     `requirement` limits the candidate cells. `index` is the result of `method_index`, if it exists
-    already. `options` are those of `locate`. A distance uses only ``top``, ``north`` and
-    ``place_name``, which is by default that of the city. For the likelihood method, the default
+    already. `options` are those of `locate`. A distance uses only ``top``, ``north`` and ``city``,
+    which is by default the one that is searched. For the likelihood method, the default
     ``store`` is that of the city, and ``refined`` depends by default on the method and the store.
     """
     if isinstance(database, City):
-        options.setdefault("place_name", database.place_name)
+        options.setdefault("city", database)
     if method.noise is None:
         from semsig_gis.localization.distance.search import DistanceLocator  # noqa: PLC0415 - above
 
@@ -160,7 +160,7 @@ def make_locator(
             requirement=requirement,
             top=options.get("top", DistanceLocator.top),
             north=options.get("north", GRID_NORTH),
-            place_name=options.get("place_name"),
+            city=options.get("city"),
         )
     from semsig_gis.localization.likelihood.locate import LikelihoodLocator  # noqa: PLC0415 - above
 

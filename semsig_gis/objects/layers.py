@@ -24,6 +24,7 @@ from semsig_gis.core import (
     EmptyResultError,
     InputError,
     crs_text,
+    map_with,
     require_metric_crs,
 )
 from semsig_gis.objects.conflation import ConflationReport, conflate
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core import AnyCrs, Taxonomy
+    from semsig_gis.core import AnyCrs, MapFrame, Taxonomy
     from semsig_gis.objects.table import StreetObjects
     from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer, Role, RowCounts
 
@@ -334,6 +335,12 @@ class Loaded(Displayed):
             "streets": "none" if self.streets is None else len(self.streets),
             "notes": len(self.objects.notes),
         }
+
+    def explore(self) -> MapFrame:
+        """Show the objects, buildings and streets on a map in a notebook (see `objects_map`)."""
+        tables = {"buildings": self.buildings, "streets": self.streets}
+        ground = {name: table for name, table in tables.items() if table is not None and len(table)}
+        return map_with("objects_map", self.objects, ground=ground)
 
 
 # The layers that are read if none is named.

@@ -337,9 +337,8 @@ class Workbench:
             rays = candidate["rays"]
             for ray in rays:
                 ray["mark"] = None if ray["query"] is None else list(marks[ray["query"]])
-            candidate["place_name"] = location.place_name and location.place_name(
-                candidate["x"], candidate["y"]
-            )
+            name = None if location.city is None else location.city.place_name
+            candidate["place_name"] = name and name(candidate["x"], candidate["y"])
             candidate["links"] = place_links(*candidate["place"])
             candidate["for_against"] = place_reasons(rays, codes, table=table, shares=self._shares)
         command = question.command(

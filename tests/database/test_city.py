@@ -128,7 +128,12 @@ def test_a_city_is_drawn_and_exported_as_its_database(tmp_path: Path) -> None:
     city.export(tmp_path / "city.gpkg")
     assert {*gpd.list_layers(tmp_path / "city.gpkg")["name"]} >= {"cells", "objects"}
     city.explore().save(tmp_path / "city.html", title="Our town")
-    assert "Our town" in (tmp_path / "city.html").read_text(encoding="utf-8")
+    page = (tmp_path / "city.html").read_text(encoding="utf-8")
+    assert "Our town" in page
+    houses = HOUSES.assign(name=["town hall", "nothing"])
+    vars(city)["store"] = ObjectStore.of(TOWN, footprints=houses, streets=STREETS)
+    layer = "Streets and buildings"
+    assert city.explore().page.count(layer) > page.count(layer)
 
 
 def test_files_that_are_not_databases_are_refused(tmp_path: Path) -> None:

@@ -32,12 +32,12 @@ from semsig_gis.localization.distance.ties import top_candidates
 from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from semsig_gis.core import MapFrame, Signature
-    from semsig_gis.database import City, SignatureDatabase
+    from semsig_gis.database import City, ObjectStore, SignatureDatabase
     from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.distance.method import Method
     from semsig_gis.localization.requirement import Requirement
@@ -164,7 +164,7 @@ class DistanceLocator:
     requirement: Requirement | None = None
     top: int = 100
     north: North = GRID_NORTH
-    place_name: Callable[[float, float], str] | None = None
+    city: City | ObjectStore | None = None
     _warm_parts: set[str] = field(default_factory=set)  # `rankings` has compared them before
 
     def __post_init__(self) -> None:  # noqa: D105
@@ -201,7 +201,7 @@ class DistanceLocator:
                 *self.north.notes,
             ),
             north=self.north,
-            place_name=self.place_name,
+            city=self.city,
         )
 
     def _search(self, query: Signature, top: int) -> tuple[Shortlist, SignatureDatabase]:

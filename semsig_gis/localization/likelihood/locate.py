@@ -52,14 +52,14 @@ from semsig_gis.localization.noise.model import cell_noise, place_noise
 from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     import pandas as pd
     from numpy.typing import NDArray
 
     from semsig_gis.core import MapFrame, Signature
-    from semsig_gis.database import ObjectStore, SignatureDatabase
+    from semsig_gis.database import City, ObjectStore, SignatureDatabase
     from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.likelihood.answer_rule import AnswerRule, Decision
     from semsig_gis.localization.likelihood.estimate import PlaceEstimate
@@ -290,11 +290,16 @@ class Location(Answer):
 
     def explore(self) -> MapFrame:
         """Show the answer on a map in a notebook (see `location_map`)."""
-        return map_with("location_map", self)
+        return map_with("location_map", self, ground=self._ground)
+
+    @property
+    def _ground(self) -> dict[str, Any]:
+        return {} if self.city is None else self.city.ground_around(self.posterior.database.xy)
 
     def export(self, path: str | Path) -> None:
         """Write the regions to search, the candidates and the place (see `export_answer`)."""
-        export_with("export_answer", self, self.posterior.database, path)
+        ground = {name: table for name, table in self._ground.items() if name != "box"}
+        export_with("export_answer", self, self.posterior.database, path, **ground)
 
     def to_dict(self) -> LocationRecord:
         """Return everything except the chances of all cells as plain values for JSON.
@@ -372,7 +377,7 @@ class LikelihoodLocator:
     quick: bool = False
     incremental: IncrementalIndex | None = None
     surely_here: bool = False
-    place_name: Callable[[float, float], str] | None = None
+    city: City | ObjectStore | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -460,13 +465,6 @@ class LikelihoodLocator:
         """Return the scores of the views of a route; the prior is that of the first."""
         first = [self.scores(query, self.log_prior) for query in queries[:1]]
         return first + [self.scores(query) for query in queries[1:]]
-
-    @property
-    def _namer(self) -> Callable[[float, float], str] | None:
-        """The function that names places: the given one, or else that of the store."""
-        if self.place_name is not None or self.store is None:
-            return self.place_name
-        return self.store.place_name
 
     def rankings(
         self,
@@ -610,7 +608,7 @@ class LikelihoodLocator:
             known=self.known,
             prior_ratio=ratio,
             north=self.north,
-            place_name=self._namer,
+            city=self.store if self.city is None else self.city,
             headings=scores.headings,
             versions=tuple(shares.tolist()),
         )
@@ -677,7 +675,7 @@ class LikelihoodOptions(TypedDict, total=False):
     explained: int
     known: Mapping[str, Any]
     surely_here: bool
-    place_name: Callable[[float, float], str] | None
+    city: City | ObjectStore | None
 
 
 class LocateOptions(LikelihoodOptions, total=False):
@@ -709,8 +707,8 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         prior in the answer, in plain values. The ``north`` is the direction from which bearings
         count, grid north by default. ``surely_here`` is whether views are surely from the area of
         the database; otherwise they are from elsewhere with a chance of 0.5 before their objects
-        are compared (see `likelihood.elsewhere`). ``place_name`` returns the name of a position in
-        metres; by default it is that of the store.
+        are compared (see `likelihood.elsewhere`). The ``city``, by default the store, names
+        places and is drawn.
 
     Returns
     -------

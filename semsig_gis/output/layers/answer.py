@@ -170,7 +170,7 @@ def answer_layers(
     candidates = candidates.assign(
         bearings=columns["bearings"],
         distances=columns["distances"],
-        address=[answer.place_name(*xy) if answer.place_name else "" for xy in viewpoints],
+        address=["" if answer.city is None else answer.city.place_name(*xy) for xy in viewpoints],
         **link_columns([place_links(row["lat"], row["lon"]) for row in answer.candidate_rows()]),
     )
     values: Mapping[str, Any] = answer.to_dict()
