@@ -219,7 +219,7 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
     title = ("Found" if given else "Cannot tell: the best guess") if rank == 1 else f"Rank {rank}"
     chance = location.answer.mass if rank == 1 else candidate["chance"]
     xy = location.xy if rank == 1 else (candidate["x"], candidate["y"])
-    where = "" if location.place_name is None else location.place_name(*xy)
+    where = "" if location.city is None else location.city.place_name(*xy)
     radius = f"within {location.rule.radius:g} m of this place"
     lines = [
         *([_capital(where)] if where else []),

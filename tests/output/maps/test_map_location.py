@@ -9,8 +9,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import folium
+import geopandas as gpd
 import numpy as np
 import pytest
+import shapely
 from map_pages import IMAGES, LEGEND
 from noisy_cells import parts_of
 from pyproj import Transformer
@@ -90,7 +92,10 @@ def test_location_map_has_layers_legend_and_signs(page: MapPage) -> None:
 
 
 def test_first_view_shows_what_was_said_next_to_what_is_there(page: MapPage) -> None:
-    location = replace(answer_with_errors(), place_name=lambda *_: "on High Street")
+    location = answer_with_errors()
+    street = shapely.Point(location.xy).buffer(1.0).boundary
+    streets = gpd.GeoDataFrame({"name": ["High Street"]}, geometry=[street], crs=CITY.crs)
+    location = replace(location, city=replace(STORE, streets=streets))
     page.open(location_map(location))
     assert page.all(".semsig-legend[open], .leaflet-control-layers-expanded") == []
     text = page.panel().replace("\u00a0", " ")
