@@ -129,7 +129,9 @@ semsig.wheel = (
       semsig.svg(object, "line", {x1: x, y1: y, x2: outX, y2: outY, class: "ray"});
     }
     const [x, y] = at(angle, free.radius);
-    const sign = semsig.svg(object, "g", {transform: `translate(${x},${y}) scale(${size})`});
+    // Smaller outside the sectors, so that they hide less.
+    const own = look.metres && verdict === "outside" ? 0.65 * size : size;
+    const sign = semsig.svg(object, "g", {transform: `translate(${x},${y}) scale(${own})`});
     const classSign = types && (classes[types[index]] || semsig.anySign);
     if (verdicts[verdict]) semsig.drawFrame(sign, verdicts[verdict]);
     if (classSign) semsig.drawSign(sign, classSign, types[index]);
