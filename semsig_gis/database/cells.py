@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,7 +39,6 @@ from semsig_gis.objects import Loaded, StreetObjects, licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
 
     import geopandas as gpd
     from numpy.typing import NDArray
@@ -184,6 +184,8 @@ def build(
     >>> len(city.database) == len(demo_database)
     True
     """
+    if path is not None and Path(path).suffix.lower() != ".parquet":
+        raise InputError(f"{path} cannot be written; the name must end in .parquet.")
     tables = (data.buildings, data.streets) if isinstance(data, Loaded) else (None, None)
     buildings, streets = (None if table is None or table.empty else table for table in tables)
     objects = data.objects if isinstance(data, Loaded) else data

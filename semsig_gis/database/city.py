@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core import DatabaseError, Displayed, export_with, map_with
+from semsig_gis.core import DatabaseError, Displayed, InputError, export_with, map_with
+from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.database.file import (
     INPUTS,
     KIND,
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.core import Axes, MapFrame
-    from semsig_gis.database.database import CellGeometry, SignatureDatabase
+    from semsig_gis.database.database import CellGeometry
     from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.place_names import PlaceNames
     from semsig_gis.database.store import ObjectStore
@@ -275,9 +276,18 @@ class City(Displayed):
                 shutil.copytree(self.store_path, partial / INPUTS)
 
 
-def whole_database(cells: SignatureDatabase | City) -> SignatureDatabase:
-    """Return the database of a city, or a database as it is."""
-    return cells.database if isinstance(cells, City) else cells
+def whole_database(cells: SignatureDatabase | City | str | Path) -> SignatureDatabase:
+    """Return the database at a path or of a city, or a database as it is; InputError for others."""
+    if isinstance(cells, City):
+        return cells.database
+    if isinstance(cells, str | Path):
+        return open_database(cells)
+    if not isinstance(cells, SignatureDatabase):
+        raise InputError(
+            f"a {type(cells).__name__} was given as the database; give a path, a city such as "
+            "build and open_city return, or a signature database."
+        )
+    return cells
 
 
 def open_city(path: str | Path) -> City:

@@ -48,6 +48,7 @@ from semsig_gis.localization import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -78,7 +79,7 @@ OUTCOME_COLUMNS = (
 
 
 def evaluate(
-    database: SignatureDatabase | City,
+    database: SignatureDatabase | City | str | Path,
     *,
     queries: int = 500,
     method: str | Method | LikelihoodIndex = DEFAULT_METHOD,
@@ -92,7 +93,7 @@ def evaluate(
 
     Parameters
     ----------
-    database : SignatureDatabase or City
+    database : SignatureDatabase, City, str or Path
         The database to search.
     queries : int, default 500
         Number of cells to draw as queries, without replacement; 1 to the number of cells.

@@ -20,7 +20,13 @@ from typing import (
 import numpy as np
 
 from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD, InputError, each_in_order
-from semsig_gis.database import City, PartitionedDatabase, join_databases, open_city
+from semsig_gis.database import (
+    City,
+    PartitionedDatabase,
+    join_databases,
+    open_city,
+    whole_database,
+)
 from semsig_gis.localization.answers import Answer
 from semsig_gis.localization.noise.model import cell_noise
 from semsig_gis.localization.noise.presets import NOISES
@@ -385,6 +391,8 @@ def localize_many(
     [2, 2]
     """
     cells = open_city(where) if isinstance(where, str | Path) else where
+    if not isinstance(cells, City | PartitionedDatabase):
+        cells = whole_database(cells)
     dataset = cells.dataset if isinstance(cells, City) else cells
     usual = method == LIKELIHOOD
     ranking = parse_method(method) if isinstance(method, str) else method

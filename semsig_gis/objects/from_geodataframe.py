@@ -141,8 +141,8 @@ def _require_frame(frame: object) -> None:
     """Raise an error if `frame` is not a GeoDataFrame with geometry and CRS."""
     if not isinstance(frame, gpd.GeoDataFrame):
         raise InputError(
-            f"a {type(frame).__name__} was given; give a GeoDataFrame, or street objects such as "
-            "open_objects returns."
+            f"a {type(frame).__name__} was given; give a GeoDataFrame, or what load or "
+            "open_objects returns for a file."
         )
     if frame.active_geometry_name is None:
         raise InputError("the table has no geometry; state it with set_geometry.")

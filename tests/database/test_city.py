@@ -112,6 +112,10 @@ def test_a_city_is_built_in_one_call(tmp_path: Path) -> None:
     assert "in memory" in repr(city)
     with refused(DatabaseError, "only in memory", "save_with_store"):
         _ = city.path
+    with refused(InputError, "city.gpkg", ".parquet"):
+        build(loaded, tmp_path / "city.gpkg")
+    with refused(InputError, "str", "load"):
+        build("town.osm.pbf")
     # The same in a file, and from the objects only.
     written = build(loaded, tmp_path / "city.parquet")
     again = open_city(written.path)

@@ -161,6 +161,12 @@ def test_other_forms_of_a_view_are_refused(view: Any, parts: tuple[str, ...]) ->
         localize(CITY, view)
 
 
+@pytest.mark.parametrize("where", [7, TOWN.street_objects])
+def test_other_places_to_search_are_refused(where: Any) -> None:  # noqa: ANN401 - any value of a user
+    with refused(InputError, type(where).__name__, "open_city"):
+        localize(where, SENTENCE)
+
+
 def test_options_of_the_likelihood_are_refused_for_a_distance() -> None:
     with refused(InputError, "north_sigma", "likelihood"):
         localize(CITY, QUERY, method=PAPER_METHOD, north_sigma=10.0)
