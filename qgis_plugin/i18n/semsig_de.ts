@@ -1656,8 +1656,8 @@
         <translation>Was zu sehen war</translation>
     </message>
     <message>
-        <source>What was seen, clockwise from north: symbols such as DDBL, or words, as 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'.</source>
-        <translation>Was zu sehen war, von Norden an im Uhrzeigersinn: Symbole wie DDBL oder (englische) Wörter, etwa 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'.</translation>
+        <source>What was seen, such as 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'; or letters of classes clockwise from north, such as DDBL.</source>
+        <translation>Was zu sehen war, etwa 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant' (auch auf Deutsch); oder Buchstaben von Klassen von Norden an im Uhrzeigersinn, etwa DDBL.</translation>
     </message>
     <message>
         <source>Whether north is known: known, unknown, or its standard deviation in degrees, 0.001 to 360.</source>

@@ -173,7 +173,7 @@ class Demo:
         for path in files.values():
             page = location_map(examples[0].answer)
             draw_ground(page, city)
-            save_map(page, path, title="Where the view is from")
+            save_map(page, path, title="A made-up town")
         files["errors on a map"] = self.out / "map.html"
         page = city_map(city.database, evaluation=evaluation, objects=city.objects)
         draw_ground(page, city)

@@ -270,8 +270,8 @@ class QueryOptions:
     seen: Annotated[
         str | None,
         Option(
-            "What was seen, clockwise from north: symbols such as DDBL, or words, as 'bench "
-            "at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'.",
+            "What was seen, such as 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no "
+            "hydrant'; or letters of classes clockwise from north, such as DDBL.",
             title="What was seen",
             positional=True,
         ),

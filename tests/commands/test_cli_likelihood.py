@@ -465,9 +465,9 @@ def test_map_age_is_printed_and_corrects_learnt_noise(city: Path, run: Run) -> N
     folder = city.with_name("evaluation")
     assert run("evaluate", city, *old, "--queries", 20, "--out", folder)[0] == 0
     command = "evaluate", city, "--queries", 20, "--foreign", city
-    out = run(*command, "--tables")[1]
-    assert re.search(r"views of the other city, [\d.]+ % were answered", flat(out))
-    assert "Views of this city and of another" in out
+    printed = run(*command, "--tables")[1]
+    assert re.search(r"views of the other city, [\d.]+ % were answered", flat(printed))
+    assert "Views of this city and of another" in printed
     rows = json.loads(run(*command, "--json")[1])["foreign"]
     assert [row["own"] for row in rows] == [row["foreign"] for row in rows]
     sentence(run(*command, "--paper"), "--foreign works only with the likelihood method")
