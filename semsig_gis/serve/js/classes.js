@@ -34,7 +34,7 @@ semsig.askClass = (session, entry, event = null, fresh = false, letter = "") => 
     offers = !words ? kinds : semsig.matches(names, words, kinds.length).map(
       (match) => kinds[match.at]);
     list.replaceChildren(...(offers.length ? offers : [null]).map((item, index) => {
-      const line = L.DomUtil.create("li", "");
+      const line = L.DomUtil.create("div", "offer");
       line.id = `class-${index}`;
       line.setAttribute("role", "option");
       if (item) {
