@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import TYPE_CHECKING, NamedTuple, Optional
 
@@ -41,6 +42,12 @@ class Mark(NamedTuple):
     distance: Optional[float] = None  # noqa: UP045 - QGIS's Python may be 3.9
 
 
+@functools.lru_cache(maxsize=None)
+def _drawing(pictogram: str, ink: str) -> QSvgRenderer:
+    """Return a pictogram; it is kept, because QGIS 3.22 crashes where one is deleted in a slot."""
+    return QSvgRenderer(SVG.format(pictogram, ink).encode())
+
+
 def paint_sign(painter: QPainter, sign: Sign, place: QPointF, radius: float = DISC) -> None:
     """Draw a disc in the colour of a class, with its pictogram or letter.
 
@@ -61,7 +68,7 @@ def paint_sign(painter: QPainter, sign: Sign, place: QPointF, radius: float = DI
     if sign.pictogram:
         half = PICTURE * radius
         box = QRectF(place.x() - half, place.y() - half, 2 * half, 2 * half)
-        QSvgRenderer(SVG.format(sign.pictogram, sign.ink).encode()).render(painter, box)
+        _drawing(sign.pictogram, sign.ink).render(painter, box)
         return
     painter.setPen(QColor(sign.ink))
     font = painter.font()
