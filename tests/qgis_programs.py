@@ -144,12 +144,12 @@ def shown(layer: Any) -> int:  # noqa: ANN401
         return 0
     context, renderer = QgsRenderContext(), layer.renderer().clone()
     renderer.startRender(context, layer.fields())
-    drawn = 0
+    count = 0
     for feature in layer.getFeatures():
         context.expressionContext().setFeature(feature)
-        drawn += renderer.willRenderFeature(feature, context)
+        count += renderer.willRenderFeature(feature, context)
     renderer.stopRender(context)
-    return drawn
+    return count
 
 
 def main(program: str, *arguments: str) -> None:

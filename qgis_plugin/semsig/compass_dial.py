@@ -42,7 +42,7 @@ class Mark(NamedTuple):
     distance: Optional[float] = None  # noqa: UP045 - QGIS's Python may be 3.9
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _drawing(pictogram: str, ink: str) -> QSvgRenderer:
     """Return a pictogram; it is kept, because QGIS 3.22 crashes where one is deleted in a slot."""
     return QSvgRenderer(SVG.format(pictogram, ink).encode())

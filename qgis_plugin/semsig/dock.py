@@ -398,8 +398,8 @@ class SemsigDock(QgsDockWidget):
                     right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
                     item.setTextAlignment(right)
                 self.table.setItem(row, column, item)
-        named = any(candidate.get("place_name") for candidate in self.candidates)
-        self.table.setColumnHidden(2, not named)
+        has_names = any(candidate.get("place_name") for candidate in self.candidates)
+        self.table.setColumnHidden(2, not has_names)
         for column in range(3):  # the last has the rest, in several lines
             self.table.resizeColumnToContents(column)
         self.table.resizeRowsToContents()

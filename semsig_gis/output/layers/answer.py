@@ -186,7 +186,7 @@ def answer_layers(
     )
     chances = answer.candidates.get("chance")
     rank = answer.candidates.columns[0]
-    drawn = len(candidates) if chances is None else max(int((chances >= LEAST_CHANCE).sum()), 1)
+    last = len(candidates) if chances is None else max(int((chances >= LEAST_CHANCE).sum()), 1)
     layers = [
         layer(
             regions.table,
@@ -217,12 +217,12 @@ def answer_layers(
                 signature=("types", "bearings", "distances", " "),
                 tip=("address", "chance", "distance"),
                 label=CANDIDATE_LABEL,
-                shown=f'"{rank}" <= {drawn}',
+                shown=f'"{rank}" <= {last}',
             ),
             styles=(by_rank(str(rank), geometry="point"),),
         ),
     ]
-    shapes = candidates.geometry.to_numpy()[:drawn]
+    shapes = candidates.geometry.to_numpy()[:last]
     if isinstance(answer, Location):
         shapes = np.append(shapes, shapely.Point(answer.xy))
     below = ((streets_layer, streets), (buildings_layer, buildings))
@@ -287,7 +287,7 @@ def answer_layers(
                     group=GROUP,
                     name='"verdict"',
                     tip=("chance", "object_title"),
-                    shown=f'"candidate" <= {drawn}',
+                    shown=f'"candidate" <= {last}',
                 ),
                 styles=(RAY_STYLE,),
             )

@@ -79,7 +79,7 @@ def cells_layer(
     crs = database.crs.to_json_dict()
     facts = {**database_specs(database), "crs": crs, "identifiability": None}
     style = functools.partial(by_amount, geometry=geometry, size=step)
-    styles = [style("Ambiguity", "type_group_size", AMBIGUITY, heading="cells alike")]
+    styles = [style("Ambiguity", "type_group_size", AMBIGUITY, heading="cells like it")]
     if identifiability is not None:
         facts["identifiability"] = identifiability.facts
         styles.insert(0, style("Identifiability", "chance_found", IDENTIFIABILITY))

@@ -87,7 +87,7 @@ def hexagons_layer(
     columns: dict[str, Any] = {"h3": names}
     columns |= area_statistics(database, of_cells, len(ids), identifiability=identifiability)
     style = functools.partial(by_amount, geometry="polygon")
-    styles = [style("Ambiguity", "type_group_size", AMBIGUITY, heading="cells alike")]
+    styles = [style("Ambiguity", "type_group_size", AMBIGUITY, heading="cells like it")]
     if identifiability is not None:
         styles.insert(0, style("Identifiability", "chance_found", IDENTIFIABILITY))
     if objects is not None:

@@ -277,10 +277,10 @@ def test_every_layer_has_a_style(file: Path, tmp_path: Path) -> None:
         root = ET.fromstring(qml)  # noqa: S314 - our own
         fields = {*pyogrio.read_info(source, layer=layer)["fields"]}
         assert {item.attrib["field"] for item in root.findall("aliases/alias")} == fields
-        drawn = [item.attrib["attr"] for item in root.findall("renderer-v2")]
+        expressions = [item.attrib["attr"] for item in root.findall("renderer-v2")]
         # An expression decides which features are drawn, or there is only the name of a field.
-        named = [re.findall(r'"(\w+)"', text) or [text] for text in drawn]
-        assert {name for names in named for name in names} <= fields
+        columns = [re.findall(r'"(\w+)"', text) or [text] for text in expressions]
+        assert {name for names in columns for name in names} <= fields
         assert (root.find("renderer-v2") is None) == (layer == "evaluation_figures")
         used = {item.attrib["symbol"] for item in root.iter() if "symbol" in item.attrib}
         assert used == {item.attrib["name"] for item in root.findall("renderer-v2/symbols/symbol")}

@@ -107,8 +107,8 @@ def wheel_signs(tip: str) -> list[str]:
     assert image is not None
     root = ET.fromstring(unquote(image[1]))  # noqa: S314 - our own
     assert all("NaN" not in group.get("transform", "") for group in root.iter(f"{SVG}g"))
-    drawn = [next(iter(group)) for group in root.iter(f"{SVG}g") if "fill" in group.attrib]
-    return [sign.get("d") or str(sign.text) for sign in drawn]
+    marks = [next(iter(group)) for group in root.iter(f"{SVG}g") if "fill" in group.attrib]
+    return [mark.get("d") or str(mark.text) for mark in marks]
 
 
 def test_city_opens_as_a_project(projects: dict[str, Any]) -> None:

@@ -79,7 +79,7 @@ def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
             ),
             (
                 "P(error ≤ 50 m) is the share of queries that are placed within 50 m of where they "
-                "were seen from, and recall@10 % the share whose true cell is among the best tenth "
+                "were seen from, and recall@10 % the share with the true cell among the best tenth "
                 "of all cells. Types are the classes of the objects that are seen, in their order, "
                 "and angles their directions."
             ),
