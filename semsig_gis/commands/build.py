@@ -159,13 +159,13 @@ class Build:
         from semsig_gis.objects import ground_file, open_objects, read_area
         from semsig_gis.storage import EMPTY_BOX, bounds_by_group
 
-        found = {
+        defaults = {
             role: ground_file(self.objects, role)
             for role in ROLES
             if self.ground and getattr(self, role) is None
         }
-        found = {role: path for role, path in found.items() if path.is_file()}
-        ground = {role: getattr(self, role) for role in ROLES} | found
+        defaults = {role: path for role, path in defaults.items() if path.is_file()}
+        ground = {role: getattr(self, role) for role in ROLES} | defaults
         mode = self.viewpoints or ("all" if ground["buildings"] is None else "outdoor")
         in_tiles = self.tile is not None or self.workers or self.scheduler is not None
         if not in_tiles and self.out.suffix.lower() != ".parquet" and not self.out.is_dir():
@@ -206,7 +206,7 @@ class Build:
             properties,
             summary=self._summary(cells, entries, mode),
             files={"signature database": self.out},
-            notes=[self._found_note(found, mode)] if found else [],
+            notes=[self._found_note(defaults, mode)] if defaults else [],
         )
 
     def _build_whole(
@@ -241,14 +241,14 @@ class Build:
         save_with_store(database, store, self.out)
         return len(database), len(database.codes)
 
-    def _found_note(self, found: Mapping[Role, Path], mode: str) -> str:
+    def _found_note(self, defaults: Mapping[Role, Path], mode: str) -> str:
         """Return a sentence on the files that were used without being named."""
-        files = " and ".join(map(str, found.values()))
+        files = " and ".join(map(str, defaults.values()))
         effect = ""
-        if "buildings" in found:
+        if "buildings" in defaults:
             outdoor = "" if self.viewpoints else f", and the viewpoints are {mode}"
             effect = f"; buildings hide what is behind them{outdoor}"
-        return f"with the {' and '.join(found)} of {files}{effect} (--no-ground: without them)"
+        return f"with the {' and '.join(defaults)} of {files}{effect} (--no-ground: without them)"
 
     def _summary(self, cells: int, entries: int, mode: str) -> Iterator[str]:
         where = {"all": "", "outdoor": " outside buildings", "streets": " along streets"}

@@ -28,7 +28,7 @@ def place_links(lat: float, lon: float, *, heading: float | None = None) -> dict
     look = "" if heading is None else f"&heading={round(heading) % 360}"
     place = f"{latitude}/{longitude}"
     return {
-        "OpenStreetMap": (f"https://www.openstreetmap.org/?mlat={lat:.5f}&mlon={lon:.5f}&zoom=19"),
+        "OpenStreetMap": f"https://www.openstreetmap.org/?mlat={lat:.5f}&mlon={lon:.5f}&zoom=19",
         "Google Street View": (
             "https://www.google.com/maps/@?api=1&map_action=pano"
             f"&viewpoint={latitude},{longitude}{look}"

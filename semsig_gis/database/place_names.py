@@ -89,10 +89,10 @@ class _Named:
         rows = np.sort(self._tree.query(place, predicate="dwithin", distance=distance))
         metres = shapely.distance(self._shapes[rows], place)
         order = np.argsort(metres, kind="stable")
-        found: dict[str, float] = {}
+        distances: dict[str, float] = {}
         for row, away in zip(rows[order].tolist(), metres[order].tolist(), strict=True):
-            found.setdefault(self._names[row], away)
-        return found
+            distances.setdefault(self._names[row], away)
+        return distances
 
     def lines(self, place: shapely.Point, name: str, distance: float) -> shapely.Geometry:
         """Return the parts with a name within a distance of a place as one shape."""

@@ -255,11 +255,11 @@ def test_buildings_hide_objects_behind_them() -> None:
     houses = gpd.GeoDataFrame(geometry=[wall], crs="EPSG:2154")
     built_with = build_index(replace(CITY, occlusion=0.5), cell_noise(named_noise("generic"), 10.0))
     store = ObjectStore.of(WORLD.street_objects, footprints=houses)
-    free, drawn, walled = (
+    free, picture, walled = (
         locate(index, seen_from(PLACE), store=store, refined=True, explained=1).explanations[0]
         for index, store in ((WIDE, STORE), (WIDE, store), (built_with, store))
     )
-    assert (drawn.xy, drawn.loglik) == (
+    assert (picture.xy, picture.loglik) == (
         free.xy,
         free.loglik,
     )  # of a database without buildings, they are only drawn
