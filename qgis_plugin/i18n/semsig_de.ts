@@ -1656,8 +1656,8 @@
         <translation>Was zu sehen war</translation>
     </message>
     <message>
-        <source>What was seen, such as 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'; or letters of classes clockwise from north, such as DDBL.</source>
-        <translation>Was zu sehen war, etwa 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant' (auch auf Deutsch); oder Buchstaben von Klassen von Norden an im Uhrzeigersinn, etwa DDBL.</translation>
+        <source>What was seen, such as 'bench at 40, two trees NE, no hydrant' or 'bench left, lamp behind near'; or letters of classes clockwise from north, such as DDBL.</source>
+        <translation>Was zu sehen war, etwa 'Bank bei 40, zwei Bäume NO, kein Hydrant' oder 'Bank links, Laterne hinter mir nah'; oder Buchstaben von Klassen von Norden an im Uhrzeigersinn, etwa DDBL.</translation>
     </message>
     <message>
         <source>Whether north is known: known, unknown, or its standard deviation in degrees, 0.001 to 360.</source>

@@ -1656,8 +1656,8 @@
         <translation>Ce qui a été vu</translation>
     </message>
     <message>
-        <source>What was seen, such as 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'; or letters of classes clockwise from north, such as DDBL.</source>
-        <translation>Ce qui a été vu, comme 'bench at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant' (aussi en français) ; ou les lettres des classes à partir du nord dans le sens des aiguilles d’une montre, comme DDBL.</translation>
+        <source>What was seen, such as 'bench at 40, two trees NE, no hydrant' or 'bench left, lamp behind near'; or letters of classes clockwise from north, such as DDBL.</source>
+        <translation>Ce qui a été vu, comme 'banc à 40, deux arbres NE, pas de bouche d’incendie' ou 'banc à gauche, lampadaire derrière moi' ; ou les lettres des classes à partir du nord dans le sens des aiguilles d’une montre, comme DDBL.</translation>
     </message>
     <message>
         <source>Whether north is known: known, unknown, or its standard deviation in degrees, 0.001 to 360.</source>

@@ -381,9 +381,9 @@ def choose_layers(
     >>> [spec.name for spec in choose_layers(load_catalog("montpellier"), ["cameras"])]
     ['cameras']
     >>> osm = load_catalog("openstreetmap")
-    >>> chosen = choose_layers(osm, ["+clocks"], selection="paper")
+    >>> chosen = choose_layers(osm, ["+telephones"], selection="paper")
     >>> [spec.name for spec in chosen][-2:]
-    ['bus_platforms', 'clocks']
+    ['bus_platforms', 'telephones']
     """
     only = {catalog.layer(name).name for name in names if not name.startswith("+")}
     added = {catalog.layer(name[1:]).name for name in names if name.startswith("+")}

@@ -177,7 +177,7 @@ def test_sources_lists_catalogues(run_ok: RunOk, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("COLUMNS", "400")  # no text is wrapped
     for line, words in {
         "sources": ("montpellier",),
-        "sources openstreetmap": ("highway=street_lamp", "clocks (optional)", "level = <0"),
+        "sources openstreetmap": ("highway=street_lamp", "telephones (optional)", "level = <0"),
         "sources opendata_paris": ("les-arbres",),
         "sources overture": ("base/land: subtype=tree and class=tree",),
         "sources mapillary": ("object--bench (",),
@@ -207,25 +207,25 @@ def test_options_select_layers_of_openstreetmap(city: Path, run_ok: RunOk) -> No
     kinds = (
         {"amenity": "bench"},
         {"highway": "crossing", "crossing": "zebra"},
-        {"amenity": "clock"},
+        {"amenity": "telephone"},
     )
     write_osm(
         city / "town.osm",
         *(node(n, 7.42, 43.73 + n / 1000, tags) for n, tags in enumerate(kinds, start=1)),
     )
     line = "load town.osm --catalog openstreetmap --out o.parquet"
-    for options, objects, crossings, clocks in (
+    for options, objects, crossings, telephones in (
         ("", 2, None, 1),
         ("--paper-classes", 1, 1, 1),
         ("--all-layers", 3, None, None),
-        ("--layer +clocks", 3, None, None),
-        ("--layer clocks", 1, 1, None),
-        ("--paper-classes --layer +clocks", 2, 1, None),
+        ("--layer +telephones", 3, None, None),
+        ("--layer telephones", 1, 1, None),
+        ("--paper-classes --layer +telephones", 2, 1, None),
     ):
         report = json.loads(run_ok(f"{line} {options} --json"))
         unread = {item["name"]: item["objects"] for item in report["unread"]}
-        counts = (report["objects"], unread.get("crossings"), unread.get("clocks"))
-        assert counts == (objects, crossings, clocks), options
+        counts = (report["objects"], unread.get("crossings"), unread.get("telephones"))
+        assert counts == (objects, crossings, telephones), options
     out = run_ok(f"{line} --paper-classes --tables")
     assert "Layers not read" in out
     assert "pedestrian_crossing" not in out.partition("No objects of")[2].partition("Rows by")[0]

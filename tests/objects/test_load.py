@@ -63,17 +63,17 @@ def test_layers_are_selected_by_name_and_selection() -> None:
         return {spec.name for spec in choose_layers(osm, names, **options)}
 
     default, paper, everything = chosen(), chosen(selection="paper"), chosen(selection="all")
-    assert default & {"trees", "crossings", "clocks", "buildings"} == {"trees", "crossings"}
-    assert paper & {"trees", "crossings", "clocks"} == {"trees"}
+    assert default & {"trees", "crossings", "telephones", "buildings"} == {"trees", "crossings"}
+    assert paper & {"trees", "crossings", "telephones"} == {"trees"}
     assert everything == {spec.name for spec in osm.layers if spec.role == "objects"}
-    assert chosen("clocks") == {"clocks"}
-    assert chosen("+clocks") == default | {"clocks"}
-    assert chosen("+clocks", "trees") == {"clocks", "trees"}
-    assert chosen("+clocks", selection="paper") == paper | {"clocks"}
-    with refused(UnknownNameError, "'clock'", "the nearest is 'clocks'"):
-        chosen("+clock")
-    with refused(InputError, "'clocks' was given without a plus sign", "all layers", "'+clocks'"):
-        chosen("clocks", selection="all")
+    assert chosen("telephones") == {"telephones"}
+    assert chosen("+telephones") == default | {"telephones"}
+    assert chosen("+telephones", "trees") == {"telephones", "trees"}
+    assert chosen("+telephones", selection="paper") == paper | {"telephones"}
+    with refused(UnknownNameError, "'telephone'", "the nearest is 'telephones'"):
+        chosen("+telephone")
+    with refused(InputError, "'telephones' was given without a plus sign", "all layers", "'+telephones'"):
+        chosen("telephones", selection="all")
     roles = {spec.role for spec in choose_layers(osm, ["trees"], surroundings=True)}
     assert roles == {"objects", "buildings", "streets"}
 
@@ -138,21 +138,21 @@ def test_coordinate_systems_are_given_as_codes_text_or_values(tmp_path: Path) ->
 
 def test_other_layers_of_an_extract_are_counted(tmp_path: Path) -> None:
     osm = load_catalog("openstreetmap")
-    tags = [{"amenity": "bench"}, *[{"amenity": "clock"}] * 2, {"natural": "tree"}]
+    tags = [{"amenity": "bench"}, *[{"amenity": "telephone"}] * 2, {"natural": "tree"}]
     nodes = (node(n, 7.42, 43.73 + n / 1000, tag) for n, tag in enumerate(tags, start=1))
     specs = choose_layers(osm, ["benches", "trees"])
     others = layers_in_same_extracts(osm, specs)
-    assert {"clocks", "taxi_ranks"} < {spec.name for spec in others}
+    assert {"telephones", "taxi_ranks"} < {spec.name for spec in others}
     layers, _ = read_files([*specs, *others], [write_osm(tmp_path / "town.osm", *nodes)])
     counted = [layer for layer in layers if layer.spec in others]
     loaded = assemble([layer for layer in layers if layer.spec in specs], osm, counted=counted)
     numbers = {layer.name: layer.objects for layer in loaded.report.unread}
-    assert (numbers.pop("clocks"), set(numbers.values())) == (2, {0})
+    assert (numbers.pop("telephones"), set(numbers.values())) == (2, {0})
     report = quality_report(loaded.objects, loaded.report)
     assert report.absent == ()
-    assert {layer["name"]: layer["objects"] for layer in report.to_dict()["unread"]}["clocks"] == 2
+    assert {layer["name"]: layer["objects"] for layer in report.to_dict()["unread"]}["telephones"] == 2
     (table,) = [item for item in quality_tables(report) if item.title == "Layers not read"]
-    assert ("clocks", "clock", "2") in table.rows
+    assert ("telephones", "telephone", "2") in table.rows
     # Layers in other files, or not fetched, are not counted.
     assert layers_in_same_extracts(load_catalog("montpellier"), []) == ()
     unread = assemble([layer for layer in layers if layer.spec in specs], osm).report.unread
