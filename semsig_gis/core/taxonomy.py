@@ -185,12 +185,12 @@ class Taxonomy(Displayed):
         """Return a taxonomy with the titles of some classes, by name, replaced."""
         return self._with("title", titles)
 
-    def _with(self, attribute: str, values: Mapping[str, object]) -> Taxonomy:
+    def _with(self, attribute: str, values: Mapping[str, Any]) -> Taxonomy:
         for name in values:
             self.by_name(name)
         return Taxonomy(
             tuple(
-                replace(item, **{attribute: values.get(item.name, getattr(item, attribute))})
+                replace(item, **{attribute: values[item.name]}) if item.name in values else item
                 for item in self.classes
             )
         )

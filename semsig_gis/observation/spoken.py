@@ -131,14 +131,14 @@ def read_sentence(text: str, taxonomy: Taxonomy) -> Sentence:
 
 def _sentence(things: Sequence[_Part], look: Row, taxonomy: Taxonomy) -> Sentence:
     """Return what the things of a sentence say; `look` has the direction of sight."""
-    seen = [(thing, thing.place()) for thing in things if not thing.absent]
+    pairs = [(thing, thing.place()) for thing in things if not thing.absent]
     rows: list[Row] = [
         {"class": taxonomy.decode(thing.codes), **place, "range": thing.range}
-        for thing, place in seen
+        for thing, place in pairs
         if place
         for _ in range(thing.count)
     ]
-    others = [thing for thing, place in seen if not place]
+    others = [thing for thing, place in pairs if not place]
     unplaced = [code for thing in others for code in thing.codes * thing.count]
     if not rows:
         rows, unplaced = [{"class": taxonomy.decode([code])} for code in unplaced], []
@@ -236,13 +236,13 @@ def _parts(items: Iterable[_Item], vocabulary: Vocabulary) -> Iterator[_Part]:
 def _part(items: list[_Item], vocabulary: Vocabulary, *, joined: bool) -> _Part:
     """Collect the items of a part."""
     part = _Part(text=" ".join(item.text for item in items), joined=joined)
-    named = any(item.kind == "thing" for item in items)
+    has_thing = any(item.kind == "thing" for item in items)
     before = ""
     while items:
         item, *items = items
         if item.kind == "symbol":  # a letter before a thing is a word: "a bench"
             _, item = (
-                _phrase([item.text], vocabulary) if named else (1, replace(item, kind="thing"))
+                _phrase([item.text], vocabulary) if has_thing else (1, replace(item, kind="thing"))
             )
         elif item.kind == "number":
             unit = items[0].kind if items else ""
@@ -322,7 +322,7 @@ class _Part:
             return "hours"
         if before == "at" or after == "turn":
             return "degrees"
-        whole = number.value.is_integer() and 1 <= number.value <= MOST_COUNT
+        whole = number.value in range(1, MOST_COUNT + 1)
         if whole and not self.codes and after in {"thing", "symbol", "other"}:
             return "count"
         if before == "turn":

@@ -7,7 +7,7 @@ import itertools
 import tomllib
 import unicodedata
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import nearest_name
 from semsig_gis.sources import class_words, data_folder, words_of
@@ -17,13 +17,9 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Taxonomy
 
-Kind = Literal[
-    "skip", "at", "none", "also", "facing", "degrees", "metres", "hours", "clock", "within",
-    "numbers", "turn", "compass", "range",
-]  # fmt: skip
-"""What a phrase says; see ``phrases.toml``."""
+# Kinds of phrases, without and with a value; see `phrases.toml`.
 LISTS = ("skip", "at", "none", "also", "facing", "degrees", "metres", "hours", "clock", "within")
-TABLES = ("numbers", "turn", "compass", "range")
+TABLES = ("number", "turn", "compass", "range")
 SHORT_WORD = 3
 """Words up to this number of letters have no endings."""
 LETTERS = 3
@@ -32,7 +28,8 @@ LONGEST = 6
 """Words in the longest phrase."""
 
 Words = tuple[str, ...]
-Meaning = tuple[Kind, Any]
+Meaning = tuple[str, Any]
+"""The kind of a phrase, and its value."""
 
 
 def plain_word(word: str) -> str:
@@ -67,15 +64,15 @@ class Vocabulary:
     @classmethod
     def of(cls, words: Sequence[str], taxonomy: Taxonomy) -> Vocabulary:
         """Return the vocabulary of the language that knows most of the words, English first."""
-        known = class_words(taxonomy)
+        terms = class_words(taxonomy)
 
         def count(language: str) -> int:
-            letters, own = _phrases()[language]["letters"], _known(known, language)
+            letters, own = _phrases()[language]["letters"], _own_words(terms, language)
             return sum(
                 word in letters if is_point(word) else plain_word(word) in own for word in words
             )
 
-        return _vocabulary(known, max(_phrases(), key=count))
+        return _vocabulary(terms, max(_phrases(), key=count))
 
     def class_of(self, words: Sequence[str]) -> int | None:
         """Return the class code for the words of a thing, None if they are for no class."""
@@ -85,16 +82,13 @@ class Vocabulary:
             return None
         return self.classes.get("".join(itertools.chain(*names)))
 
-    def meaning(self, words: Sequence[str]) -> tuple[str, Any] | None:
+    def meaning(self, words: Sequence[str]) -> Meaning | None:
         """Return the kind and the value of a phrase, None if it has no meaning."""
         (word, *more) = words
         letters = is_point(word) or (self.language == "en" and len(word) > 1)
         if not more and letters and (bearing := self.letters.get(word.upper())) is not None:
             return "compass", bearing
-        kind, value = self.phrases.get(tuple(map(plain_word, words)), (None, None))
-        if kind is None:
-            return None
-        return ("number", float(value)) if kind == "numbers" else (kind, value)
+        return self.phrases.get(tuple(map(plain_word, words)))
 
     def nearest(self, text: str) -> str:
         """Return ``"; the nearest is 'x'"`` for the nearest word of the language, or nothing."""
@@ -125,7 +119,7 @@ def _shared() -> dict[Words, Meaning]:
     for language in _phrases():
         for words, meaning in _meanings(language).items():
             meanings.setdefault(words, set()).add(meaning)
-    return {words: next(iter(found)) for words, found in meanings.items() if len(found) == 1}
+    return {words: next(iter(values)) for words, values in meanings.items() if len(values) == 1}
 
 
 def _forms(phrase: str, endings: Sequence[str]) -> set[str]:
@@ -138,16 +132,16 @@ def _forms(phrase: str, endings: Sequence[str]) -> set[str]:
 
 
 @functools.lru_cache(maxsize=64)
-def _vocabulary(known: tuple[tuple[str, int, str], ...], language: str) -> Vocabulary:
+def _vocabulary(terms: tuple[tuple[str, int, str], ...], language: str) -> Vocabulary:
     classes: dict[str, int] = {}
     # All words as they are go before their forms, the own language before others.
     for exact in (True, False):
-        for name in dict.fromkeys(["", language, *_phrases(), *(name for name, _, _ in known)]):
+        for name in dict.fromkeys(["", language, *_phrases(), *(name for name, _, _ in terms)]):
             endings = () if exact else _phrases().get(name or "en", {}).get("endings", ())
-            for _, code, phrase in (item for item in known if item[0] == name):
+            for _, code, phrase in (item for item in terms if item[0] == name):
                 for form in _forms(phrase, endings):
                     classes.setdefault(form, code)
-    names = tuple(word for name, _, word in known if name in {"", language})
+    names = tuple(word for name, _, word in terms if name in {"", language})
     return Vocabulary(
         language=language,
         classes=classes,
@@ -158,12 +152,12 @@ def _vocabulary(known: tuple[tuple[str, int, str], ...], language: str) -> Vocab
 
 
 @functools.lru_cache(maxsize=64)
-def _known(known: tuple[tuple[str, int, str], ...], language: str) -> frozenset[str]:
+def _own_words(terms: tuple[tuple[str, int, str], ...], language: str) -> frozenset[str]:
     """Return the single words of a language."""
     endings = ["", *_phrases()[language]["endings"]]
     things = {
         word + ending
-        for name, _, phrase in known
+        for name, _, phrase in terms
         if name == language
         for word in map(plain_word, phrase.split())
         for ending in endings

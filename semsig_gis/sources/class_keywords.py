@@ -153,7 +153,7 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
     text = word.strip()
     if len(text) == 1:
         return int(taxonomy.encode(text)[0])
-    words = _class_words(class_words(taxonomy, said={"en"}))
+    words = _class_words(class_words(taxonomy, languages={"en"}))
     code: int | None
     if "=" in text:
         key, _, value = (part.strip() for part in text.partition("="))
@@ -184,21 +184,21 @@ def _content() -> dict[str, Any]:
 
 
 def class_words(
-    taxonomy: Taxonomy, *, said: Container[str] | None = None
+    taxonomy: Taxonomy, *, languages: Container[str] | None = None
 ) -> tuple[tuple[str, int, str], ...]:
     """Return the words for the classes, each with its language and class code.
 
     The language of names and titles is empty, because they may be in any. Words that only people
-    say may be limited to the languages `said`.
+    say may be limited to the languages `languages`.
     """
     lists = _content()["classes"]
     words = [("", WILDCARD, "unknown")]
     for item in taxonomy.classes:
         words += [("", item.code, item.name.replace("_", " ")), ("", item.code, item.title)]
         by_key = dict(lists.get(item.name, {}))
-        spoken = by_key.pop(SPOKEN, {}).items()
+        more = by_key.pop(SPOKEN, {}).items()
         lists_of_words = [pair for pair in by_key.items() if pair[0] != "fields"]
-        lists_of_words += [pair for pair in spoken if said is None or pair[0] in said]
+        lists_of_words += [pair for pair in more if languages is None or pair[0] in languages]
         words += [(key, item.code, word) for key, phrases in lists_of_words for word in phrases]
     return tuple(words)
 
@@ -206,12 +206,12 @@ def class_words(
 @functools.lru_cache(maxsize=8)
 def _class_words(classes: tuple[tuple[str, int, str], ...]) -> Mapping[str, tuple[int, str]]:
     """Return class code and original word by normalized word (lower case, no blanks)."""
-    found: dict[str, tuple[int, str]] = {}
+    code_of: dict[str, tuple[int, str]] = {}
     # Names and titles have priority, then English.
     for _, code, word in sorted(classes, key=lambda item: (item[0] != "", item[0] != "en")):
         if joined := "".join(words_of(word)):
-            found.setdefault(joined, (code, word))
-    return found
+            code_of.setdefault(joined, (code, word))
+    return code_of
 
 
 @functools.cache

@@ -72,7 +72,9 @@ def test_layers_are_selected_by_name_and_selection() -> None:
     assert chosen("+telephones", selection="paper") == paper | {"telephones"}
     with refused(UnknownNameError, "'telephone'", "the nearest is 'telephones'"):
         chosen("+telephone")
-    with refused(InputError, "'telephones' was given without a plus sign", "all layers", "'+telephones'"):
+    with refused(
+        InputError, "'telephones' was given without a plus sign", "all layers", "'+telephones'"
+    ):
         chosen("telephones", selection="all")
     roles = {spec.role for spec in choose_layers(osm, ["trees"], surroundings=True)}
     assert roles == {"objects", "buildings", "streets"}
@@ -150,7 +152,9 @@ def test_other_layers_of_an_extract_are_counted(tmp_path: Path) -> None:
     assert (numbers.pop("telephones"), set(numbers.values())) == (2, {0})
     report = quality_report(loaded.objects, loaded.report)
     assert report.absent == ()
-    assert {layer["name"]: layer["objects"] for layer in report.to_dict()["unread"]}["telephones"] == 2
+    assert {layer["name"]: layer["objects"] for layer in report.to_dict()["unread"]}[
+        "telephones"
+    ] == 2
     (table,) = [item for item in quality_tables(report) if item.title == "Layers not read"]
     assert ("telephones", "telephone", "2") in table.rows
     # Layers in other files, or not fetched, are not counted.

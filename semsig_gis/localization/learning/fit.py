@@ -317,7 +317,7 @@ def _bearing_errors(
     whole = share * association.squares[objects] + 1.0 - share
     # Bearings with errors of their own say nothing about the error of the model.
     usable = evidence.detections.bearing_errors[evidence.pairs.detections] == 0.0
-    return np.stack([squares, whole]) * (association.chances * usable)
+    return np.asarray(np.stack([squares, whole]) * (association.chances * usable))
 
 
 def _range_errors(

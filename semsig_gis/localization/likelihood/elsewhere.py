@@ -160,7 +160,7 @@ def _blurred(density: NDArray[np.float64], error: float) -> NDArray[np.float64]:
     harmonics = np.arange(len(BINS) // 2 + 1)
     less = np.exp(-0.5 * (harmonics * math.radians(error)) ** 2)
     blurred = np.fft.irfft(np.fft.rfft(density) * less, len(BINS))
-    return np.maximum(blurred, density.min(axis=-1, keepdims=True))
+    return np.asarray(np.maximum(blurred, density.min(axis=-1, keepdims=True)))
 
 
 def _density(database: SignatureDatabase, table: NoiseTable, cell: int) -> NDArray[np.float64]:
