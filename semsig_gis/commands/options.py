@@ -270,8 +270,8 @@ class QueryOptions:
     seen: Annotated[
         str | None,
         Option(
-            "What was seen, such as 'bench at 40, two trees NE, no hydrant' or 'bench left, lamp behind "
-            "near'; or letters of classes clockwise from north, such as DDBL.",
+            "What was seen, such as 'bench at 40, two trees NE, no hydrant' or 'bench left, lamp "
+            "behind near'; or letters of classes clockwise from north, such as DDBL.",
             title="What was seen",
             positional=True,
         ),

@@ -280,7 +280,9 @@ def test_section_on_unambiguous_queries(report: Report, reproduction: Reproducti
     unambiguous = queries[queries["type_group"] == 1]
     section = numbers(report, "alone")
     assert section["light", "P(error ≤ 50 m)"].ours == pytest.approx(unambiguous["p50"].mean())
-    assert section["queries", "share in a group of one"].ours == pytest.approx(len(unambiguous) / QUERIES)
+    assert section["queries", "share in a group of one"].ours == pytest.approx(
+        len(unambiguous) / QUERIES
+    )
 
 
 def test_share_is_reweighted_to_the_papers_unambiguous_queries(
