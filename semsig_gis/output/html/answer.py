@@ -337,8 +337,15 @@ def _corners(location: Location) -> NDArray[np.float64]:
     middle = np.array([[place.x, place.y]])
     if not location.answer.given:
         return to_latlon(np.concatenate([middle, _viewpoints(location)]), location.crs)
-    rows = location.explanations[0].rows if location.explanations else ()
-    signs = [row["place"] for row in rows if row["place"]]
+    signs = [
+        row["place"] or end
+        for explanation in location.explanations[:1]
+        for row, end in zip(
+            explanation.rows,
+            explanation.ends(location.posterior.database.reach).tolist(),
+            strict=True,
+        )
+    ]
     around = max(SURROUNDINGS_M, 1.5 * place.ellipse()[0])
     corners = np.concatenate([middle - around, middle + around, np.array(signs).reshape(-1, 2)])
     margin = 0.1 * np.ptp(corners, axis=0)
