@@ -45,7 +45,7 @@ PLACES = ("near", "area", "popularity", "objects")
     order=1,
     returns="semsig_gis.output:LocalizeRecord",
     examples=(
-        "semsig localize city.parquet 'bench at 40, lamp at 80, bus stop left'",
+        "semsig localize city.parquet 'bench at 40, lamp at 80, no bus stop'",
         "semsig localize city.parquet --queries views.jsonl",
     ),
 )

@@ -190,12 +190,12 @@ def _items(
             item = _Item("number", float(text), text)
         elif token["tag"]:
             item = _Item("thing", class_code(text, taxonomy), text)
-        elif first and text in symbols:
-            item = _Item("symbol", symbols[text], text)
         else:
             following = tokens[place : place + LONGEST]
             words = [*itertools.takewhile(bool, (other["word"] for other in following))]
             size, item = _phrase(words, vocabulary, numbered=numbered)
+            if first and size == 1 and text in symbols:
+                item = _Item("symbol", symbols[text], text)
         yield item
         numbered = item.kind == "number"
         first = item.kind in SEPARATORS or (first and item.kind in {"skip", "number", "none"})

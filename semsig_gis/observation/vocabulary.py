@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Kinds of phrases, without and with a value; see `phrases.toml`.
 LISTS = ("skip", "at", "none", "also", "facing", "degrees", "metres", "hours", "clock", "within")
 TABLES = ("number", "turn", "compass", "range")
-SHORT_WORD = 3
+SHORT_WORD = 2
 """Words up to this number of letters have no endings."""
 LETTERS = 3
 """Letters of the longest point of the compass, such as NNE."""

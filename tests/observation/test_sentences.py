@@ -302,6 +302,8 @@ def test_sentences_of_people_are_understood(language: str) -> None:
         ("I can't see a bench", ["no bench"]),
         ("il n'y a pas de banc, un lampadaire à gauche", ["no bench", "street_light -90"]),
         ("Bank bei 40", ["bench at 40"]),
+        ("two phone boxes NE", ["telephone at 45", "telephone at 45"]),
+        ("c'è una fontana dietro di me", ["water_fountain +180"]),
         ("lamp near", ["street_light"]),
     ],
 )
