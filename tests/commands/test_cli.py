@@ -414,6 +414,22 @@ def test_likelihood_is_evaluated_and_drawn(run_ok: RunOk) -> None:
     assert "likelihood, noise: light" in text("map.html")
 
 
+@pytest.mark.usefixtures("city")
+def test_sentence_is_repeated_as_it_was_understood(run_ok: RunOk) -> None:
+    said = "a green lamp on the left, 2 lamps ahead, lamp 20 right, no crossing"
+    out = " ".join(run_ok("localize city.parquet", said).split())
+    seen = "street light ahead ± 26°, street light ahead ± 26°, street light 20° right, "
+    assert f"Seen: {seen}street light 90° left ± 26°; north unknown." in out
+    assert "Not there: crossing" in out
+    assert "Note: 'green' was not used." in out
+    out = " ".join(
+        run_ok("localize city.parquet", "zwei Laternen NO, Laterne auf 200 Grad").split()
+    )
+    assert (
+        "Seen: street light at 45° ± 13°, street light at 45° ± 13°, street light at 200°." in out
+    )
+
+
 def test_many_queries_are_answered_line_by_line(
     city: Path, run_ok: RunOk, monkeypatch: pytest.MonkeyPatch
 ) -> None:

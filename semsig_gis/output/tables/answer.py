@@ -6,7 +6,7 @@ import itertools
 import math
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import Table, figure, percent, to_degrees
+from semsig_gis.core import Table, figure, percent, signed_degrees, to_degrees
 from semsig_gis.localization import Location
 from semsig_gis.observation import GRID_NORTH, View
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Taxonomy
     from semsig_gis.localization import Answer, ClassQuestion, Explanation, Localization
+    from semsig_gis.observation import Photo
 
 LINKS = 2  # addresses below an answer; the details have all
 QUESTIONS = 5  # best ones of those to ask next; the details have all
@@ -292,10 +293,25 @@ def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
     if view.bearings is not None:
         error = math.nan if view.bearing_errors is None else view.bearing_errors[row]
         spread = "" if math.isnan(error) else f" ± {error:.2g}°"
-        parts.append(f"at {view.bearings[row]:.4g}°{spread}")
+        photo = view.photos[int(view.photo_rows[row])]
+        parts.append(f"{_direction(float(view.bearings[row]), photo)}{spread}")
     if view.ranges is not None and not math.isnan(view.ranges[row]):
         parts.append(f"{view.ranges[row]:.2g} m away")
     return " ".join(parts)
+
+
+def _direction(bearing: float, photo: Photo) -> str:
+    """Return the direction of an object: from north, or from the direction of sight.
+
+    The latter if north is not known and the photo, if it is no full turn, looks at 0.
+    """
+    middles = {(start + end) / 2.0 % 360.0 for start, end in photo.sectors}
+    if photo.north_sigma != math.inf or middles - {0.0}:
+        return f"at {bearing:.4g}°"
+    away = float(signed_degrees(bearing))
+    if away in {0.0, -180.0}:
+        return "behind" if away else "ahead"
+    return f"{abs(away):.4g}° {'right' if away > 0 else 'left'}"
 
 
 def _explanation_table(rank: int, explanation: Explanation, answer: Location) -> Table | str:
