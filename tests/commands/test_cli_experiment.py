@@ -37,9 +37,10 @@ def _spec(town: Path) -> None:  # noqa: ARG001
 
 
 def test_experiment_is_run_resumed_and_compared(run: Run, run_ok: RunOk) -> None:
-    code, out, _ = run(EXPERIMENT, "results")
+    code, out, _ = run(EXPERIMENT, "results", "--tables")
     assert code == 0
-    for words in ("phone: medium, compass:5, view:180", "refined, t = 1", "results: results"):
+    assert out.startswith("The best of 2 evaluations is ")
+    for words in ("phone: medium, compass:5, view:180", "refined, ", "results: results"):
         assert words in out
     code, out, err = run(EXPERIMENT, "results", "--json")
     assert (code, err) == (0, "")

@@ -43,7 +43,7 @@ def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_columns_are_printed_drawn_and_exported(run: Run, run_ok: RunOk) -> None:
-    code, out, err = run("identify city.parquet --noise medium --check 40")
+    code, out, err = run("identify city.parquet --noise medium --check 40 --tables")
     assert code == 0
     for words in ("Identifiability, medium noise", "What each class adds", "by 1,000 objects",
                   "bits left", "Do the chances come true?", "Rank correlation",
@@ -59,7 +59,8 @@ def test_columns_are_printed_drawn_and_exported(run: Run, run_ok: RunOk) -> None
     assert facts["chance_found"] == pytest.approx(cells["chance_found"].mean())
     assert facts["classes"][0]["objects"] > 0
     assert json.loads(run_ok("info city.parquet --json"))["identifiability"] == facts
-    assert "Identifiability, medium noise" in run_ok("info city.parquet")
+    assert "Identifiability, medium noise" in run_ok("info city.parquet --tables")
+    assert "From the mean cell, a query is placed within 50 m" in run_ok("info city.parquet")
 
     run_ok("map city.parquet --identifiability --out map.html")
     assert "Where a query can be placed" in Path("map.html").read_text(encoding="utf-8")
@@ -85,7 +86,7 @@ def test_other_settings_are_computed_again(run: Run, run_ok: RunOk) -> None:
 
 
 def test_view_of_photos_is_shown(run_ok: RunOk) -> None:
-    assert "A photo of 70 degrees from the mean cell" in run_ok(
+    assert "From the mean cell, a photo of 70 degrees is placed" in run_ok(
         "identify city.parquet --noise medium --view 70 --check 20 --out report"
     )
     assert json.loads(run_ok("info city.parquet --json"))["identifiability"]["view_degrees"] == 70.0

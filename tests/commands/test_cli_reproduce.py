@@ -33,7 +33,7 @@ def test_finished_run_is_reported_again(reproduced: Path, run_ok: RunOk) -> None
 
 
 def test_small_run_with_workers(tmp_path: Path, run_ok: RunOk) -> None:
-    line = "reproduce --size small --queries 3 --workers 1"
+    line = "reproduce --size small --queries 3 --workers 1 --tables"
     out = run_ok(line, save_town(tmp_path), "--out", tmp_path / "out")
     assert out.startswith("At medium distortion the method that the paper recommends places ")
     assert "0.3733" in out

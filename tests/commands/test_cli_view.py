@@ -75,7 +75,7 @@ def written(path: Path) -> tuple[str | int, View]:
 def test_boxes_become_views(coco: Path, run: Run) -> None:
     code, out, err = run("view coco.json --fov 90 --heading 100 --heading-error 5 --out v.jsonl")
     assert code == 0, err
-    assert out == "v.jsonl: 1 view of 1 picture with 3 objects, 3 with a range.\n"
+    assert out == "1 view of 1 picture with 3 objects, 3 with a range.\nviews: v.jsonl\n"
     assert err.splitlines() == [
         "semsig: left out: 1 box below --min-score",
         "semsig: left out: 1 box with labels that are in no label map: lion 1",
@@ -127,7 +127,7 @@ def test_pictures_and_files_that_are_left_out_are_named(coco: Path, run: Run) ->
     Image.new("L", (400, 300)).save(folder / "a.jpg")
     code, out, err = run("view labels --fov 90 --out v.jsonl")
     assert code == 0, err
-    assert out == "v.jsonl: 1 view of 1 picture with 1 object, 1 with a range.\n"
+    assert out == "1 view of 1 picture with 1 object, 1 with a range.\nviews: v.jsonl\n"
     first, second = err.splitlines()[:2]
     assert first == "semsig: left out: labels/README.txt, in no format of detections"
     assert second.startswith("semsig: left out: 1 picture: the size of the picture b.jpg is not ")
@@ -176,7 +176,7 @@ def test_detector_finds_the_objects_of_photographs(labels: str, run: Run, tmp_pa
         *labels.split(),
     )
     assert code == 0, err
-    assert out.startswith("v.jsonl: 3 views of 3 pictures with ")
+    assert out.startswith("3 views of 3 pictures with ")
     assert "measured from true north: 2 headings" in err
     assert "the heading of 1 picture is unknown" in err
     views = [line.query for line in read_queries("v.jsonl", taxonomy=TAXONOMY)]
