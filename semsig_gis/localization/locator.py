@@ -256,8 +256,8 @@ def method_index(database: SignatureDatabase, method: LikelihoodMethod) -> Likel
 
 @overload
 def localize(
-    where: Where,
-    view: AnyView,
+    database: Where,
+    query: AnyView,
     *,
     method: LikelihoodMethod | Literal["likelihood"] = DEFAULT_METHOD,
     requirement: Requirement | None = None,
@@ -267,8 +267,8 @@ def localize(
 ) -> Location: ...
 @overload
 def localize(
-    where: Where,
-    view: AnyView,
+    database: Where,
+    query: AnyView,
     *,
     method: Method,
     requirement: Requirement | None = None,
@@ -277,8 +277,8 @@ def localize(
 ) -> Localization: ...
 @overload
 def localize(
-    where: Where,
-    view: AnyView,
+    database: Where,
+    query: AnyView,
     *,
     method: str,
     requirement: Requirement | None = None,
@@ -287,8 +287,8 @@ def localize(
     **options: Unpack[LikelihoodOptions],
 ) -> Location | Localization: ...
 def localize(
-    where: Where,
-    view: AnyView,
+    database: Where,
+    query: AnyView,
     *,
     method: str | AnyMethod = DEFAULT_METHOD,
     requirement: Requirement | None = None,
@@ -300,11 +300,11 @@ def localize(
 
     Parameters
     ----------
-    where : str, Path, City, SignatureDatabase or PartitionedDatabase
+    database : str, Path, City, SignatureDatabase or PartitionedDatabase
         The cells: the file or folder of a database, or one that is open, which is faster from the
         second question on. A distance reads a partitioned database one part at a time. The
         likelihood method also searches between the centres of cells if there are street objects.
-    view : str, iterable, dict or Signature
+    query : str, iterable, dict or Signature
         What a person or a detector saw: a sentence, a list of pairs of class and bearing, a row as
         `parse_view` takes it, or a view. Objects of a class that no cell sees are not used, with a
         note in the answer.
@@ -355,13 +355,13 @@ def localize(
     'types+angles'
     """
     settings: dict[str, Any] = {"requirement": requirement, "top": top, "north": north, **options}
-    (answer,) = localize_many(where, [view], method=method, **settings)
+    (answer,) = localize_many(database, [query], method=method, **settings)
     return cast("Location | Localization", answer)
 
 
 def localize_many(
-    where: Where,
-    views: Iterable[AnyView],
+    database: Where,
+    queries: Iterable[AnyView],
     *,
     method: str | AnyMethod = DEFAULT_METHOD,
     requirement: Requirement | None = None,
@@ -373,9 +373,9 @@ def localize_many(
 
     Parameters
     ----------
-    where, method, requirement, top, north, **options
+    database, method, requirement, top, north, **options
         As in `localize`.
-    views : iterable
+    queries : iterable
         What was seen, each as in `localize`. One that cannot be read raises its error in its turn.
 
     Returns
@@ -390,7 +390,7 @@ def localize_many(
     >>> [len(answer.query) for answer in localize_many(demo_database, views)]
     [2, 2]
     """
-    cells = open_city(where) if isinstance(where, str | Path) else where
+    cells = open_city(database) if isinstance(database, str | Path) else database
     if not isinstance(cells, City | PartitionedDatabase):
         cells = whole_database(cells)
     dataset = cells.dataset if isinstance(cells, City) else cells
@@ -422,4 +422,4 @@ def localize_many(
             locator = replace(locator, explained=1)
         return cast("Location | Localization", locator.locate(description.view))
 
-    return each_in_order(answer, views)
+    return each_in_order(answer, queries)
