@@ -80,9 +80,17 @@ class Table:
         return cls(title, tuple(columns), tuple(texts), minor=minor)
 
     @classmethod
-    def of_columns(cls, title: str, columns: Mapping[str, Iterable[str]], note: str = "") -> Table:
+    def of_columns(
+        cls,
+        title: str,
+        columns: Mapping[str, Iterable[str]],
+        note: str = "",
+        *,
+        minor: tuple[str, ...] = (),
+    ) -> Table:
         """Return a table from columns by heading."""
-        return cls(title, tuple(columns), tuple(zip(*columns.values(), strict=True)), note)
+        rows = tuple(zip(*columns.values(), strict=True))
+        return cls(title, tuple(columns), rows, note, minor=minor)
 
     @property
     def group_starts(self) -> frozenset[int]:

@@ -10,11 +10,11 @@ import pandas as pd
 from semsig_gis.core import ERROR_BREAKS, Table, figure, interval
 from semsig_gis.evaluation.figures import percentile
 from semsig_gis.evaluation.queries.distortion_text import chain_text
+from semsig_gis.evaluation.result import Evaluation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
 
 
@@ -27,6 +27,8 @@ SHOWN = {
     "precision": "Right",
     "in_region": "In region",
 }
+
+MINOR = tuple(SHOWN[f"p{metres}"] for metres in ERROR_BREAKS if metres != Evaluation.success_metres)
 
 
 def experiment_figures(results: Mapping[str, Evaluation]) -> pd.DataFrame:
@@ -88,7 +90,7 @@ def experiment_tables(
         if times:
             columns["s a query"] = [f"{case.seconds_per_query:.4f}" for case in cases.values()]
         title = f"{distortion}: {chain_text(chain) or 'no distortion'}"
-        tables.append(Table.of_columns(title, columns))
+        tables.append(Table.of_columns(title, columns, minor=MINOR))
     return tuple(tables)
 
 
