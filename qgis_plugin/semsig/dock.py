@@ -367,7 +367,7 @@ class SemsigDock(QgsDockWidget):
         place, name = f"{lat:.6f}, {lon:.6f}", answer.get("place_name")
         place = f"{name} ({place})" if name else place
         lines = [text, doubt(answer, tr), tr("Best place: {place}").format(place=place)]
-        links = links_line(answer["candidates"][0].get("links", {}))
+        links = links_line(answer.get("links", {}))
         self._list(answer, "<br>".join([*(escape(line) for line in lines if line), links]))
         self.message.setText(tr("Choose a rank in the list to go there."))
         self._go_to([candidate["place"] for candidate in self.candidates[:3]])

@@ -211,11 +211,17 @@ def add_layers(
 
 
 def replace_answer(path: str) -> None:
-    """Show the layers of an answer of the dock, in place of those of the previous answer."""
+    """Show the layers of an answer of the dock, in place of those of the previous answer.
+
+    Streets and buildings are left out where the project has some: their names would appear twice.
+    """
     project = QgsProject.instance()
     remove_answer()
+    ground = [layer for layer in project.mapLayers().values() if _is_one_of(layer, GROUND)]
     group = _group_of(tr("Answer"))
     for name, title in _titles(path).items():
+        if name in GROUND and ground:
+            continue
         layer = QgsVectorLayer(_source(path, name), tr(title), "ogr")
         layer.setCustomProperty(KEY, name)
         _apply_style(layer)

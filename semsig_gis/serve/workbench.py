@@ -350,6 +350,7 @@ class Workbench:
         )
         return drawing | {
             "place_name": location.place,
+            "links": location.links,
             "region": self._region(location),
             "truth": None if question.truth is None else self._truth(location, question.truth),
             "command": command,
