@@ -124,8 +124,11 @@ def read_sentence(text: str, taxonomy: Taxonomy) -> Sentence:
             last.take(part)
         elif part.says_where:
             waiting = part
-    if waiting is not None:
-        raise InputError(f"{waiting.text!r} does not say what is there; name the thing.")
+    if waiting is not None or (text.strip() and not things):
+        words = text if waiting is None else waiting.text
+        raise InputError(
+            f"{words!r} does not say what is there; say what was seen, such as 'bench at 40'."
+        )
     return _sentence(things, look, taxonomy)
 
 

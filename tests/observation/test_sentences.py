@@ -188,6 +188,8 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"see": "lamp at 13 o'clock"}, "is not clear"),
     ({"see": "no bench on the left"}, "says where something is not"),
     ({"see": "no bench and lamp"}, "say 'no' before each thing"),
+    ({"see": "I see the"}, "'I see the' does not say what is there; say what was seen"),
+    ({"see": "''"}, "does not say what is there"),
     ({"see": "lamp at 2, on the left"}, "'on the left' does not say what is there"),
     ({"see": "one very old and a very big dark tree"}, "'very old'"),
     ({"see": "lamp left, tree NE"}, "say where you look"),

@@ -250,6 +250,7 @@ def _unused_notes(query: Signature, method: Method) -> tuple[str, ...]:
         return ()
     parts = {
         "ranges": query.ranges is not None,
+        "errors of bearings": query.bearing_errors is not None,
         "scores": query.scores is not None,
         "sectors": any(photo.sectors for photo in query.photos),
         "errors of north": any(photo.north_sigma for photo in query.photos),
