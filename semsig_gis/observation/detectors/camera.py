@@ -21,7 +21,7 @@ USUAL_FOV: dict[str, float] = {"equirectangular": 360.0, "cylindrical": 360.0, "
 """Default fields of view in degrees; a pinhole camera has none."""
 
 POSSIBLE_FOV = (40.0, 55.0, 70.0, 85.0, 100.0)
-"""Fields of view in degrees that stand for those of a photograph whose own is unknown."""
+"""Fields of view in degrees that a photograph of unknown field of view may have."""
 
 MOST_PIXELS = 1_000_000
 MOST_FOV = {"pinhole": 175.0}  # a flat picture cannot show half a turn

@@ -118,3 +118,15 @@ def test_values_out_of_range_are_refused(wrong: dict[str, object], words: str) -
     values: dict[str, object] = {"width": 400, "height": 300, "fov": 70, **wrong}
     with refused(InputError, words):
         Camera(**values)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("projection", ["pinhole", "equirectangular"])
+def test_scale_is_the_turn_of_a_pixel(projection: Projection) -> None:
+    camera = Camera(width=1000, height=500, fov=PROJECTIONS[projection], projection=projection)
+    columns = np.array([100.0, 400.0, 730.0])
+    edges = columns[:, None] + [-0.5, 0.0, 0.5]
+    rays = camera.directions(np.stack([edges, np.full(edges.shape, 250.0)], axis=-1))
+    bearings = np.arctan2(rays[..., 0], rays[..., 2])
+    turns = bearings[:, 2] - bearings[:, 0]
+    scale = camera.log_scale(np.degrees(bearings[:, 1]))
+    assert scale == pytest.approx(np.log(turns).sum(), abs=1e-4)
