@@ -17,7 +17,7 @@ from sentences import refused
 
 from semsig_gis.core import SemsigError
 from semsig_gis.observation import GUESS_ERROR, Photo, parse_seen, parse_view
-from semsig_gis.sources import load_catalog
+from semsig_gis.sources import data_folder, load_catalog
 
 if TYPE_CHECKING:
     from semsig_gis.observation import View, ViewRecord
@@ -339,3 +339,16 @@ def test_suggestions_are_in_the_language_of_the_sentence(text: str, nearest: str
     with pytest.raises(SemsigError) as caught:
         read({"see": "pub at 40"})
     assert "poubelle" not in str(caught.value)
+
+
+def test_phrases_are_written_as_they_are_compared() -> None:
+    phrases = tomllib.loads((data_folder() / "phrases.toml").read_text("utf-8"))
+    kinds = [frozenset(table) for table in phrases.values()]
+    assert len(set(kinds)) == 1
+    for table in phrases.values():
+        for kind in kinds[0] - {"letters", "endings"}:
+            for phrase in table[kind]:
+                assert phrase == phrase.lower()
+                assert phrase.isascii() or phrase == "°"
+                assert 1 <= len(phrase.split()) <= 6, phrase
+        assert all(letters.isupper() and len(letters) <= 3 for letters in table["letters"])
