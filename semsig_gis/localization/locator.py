@@ -19,7 +19,7 @@ from typing import (
 
 import numpy as np
 
-from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD, InputError, each_in_order
+from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD, InputError, Signature, each_in_order
 from semsig_gis.database import (
     City,
     PartitionedDatabase,
@@ -30,12 +30,11 @@ from semsig_gis.database import (
 from semsig_gis.localization.answers import Answer
 from semsig_gis.localization.noise.model import cell_noise
 from semsig_gis.localization.noise.presets import NOISES
-from semsig_gis.observation import GRID_NORTH, View, read_description
+from semsig_gis.observation import GRID_NORTH, Description, View, read_description
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from semsig_gis.core import Signature
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.answers import Ranking
     from semsig_gis.localization.distance.memo import DistanceMemo
@@ -408,8 +407,13 @@ def localize_many(
         settings: LocateOptions = {"top": top, "north": north, **options}
         return make_locator(cells, own, requirement=requirement, **settings)
 
+    @cache  # of a database in parts, the first part is read for them
+    def words() -> dict[str, Any]:
+        return {"taxonomy": dataset.taxonomy, "radius": dataset.spec.radius}
+
     def answer(item: AnyView) -> Location | Localization:
-        description = read_description(item, taxonomy=dataset.taxonomy, radius=dataset.spec.radius)
+        is_view = isinstance(item, Signature)
+        description = Description(view=item) if is_view else read_description(item, **words())
         noise = usual_noise(description.view, in_words=description.in_words)
         locator = locator_for(noise if usual else "")
         unplaced, absent = description.unplaced, description.absent
