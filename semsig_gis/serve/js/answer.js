@@ -122,7 +122,7 @@ semsig.Answer = class {
       html.append(semsig.sign(item));
       L.marker(ray.to, {
         icon: L.divIcon({html, className: "", iconSize: [22, 22]}), keyboard: false,
-        zIndexOffset: chosen ? 2000 : 0,
+        zIndexOffset: chosen ? 900 : 0,
       }).bindTooltip(`${ray.title}: ${text}`).addTo(drawn)
         .on("click", () => { if (mark) session.show(scene, mark); });
     }
