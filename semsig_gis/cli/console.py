@@ -176,20 +176,20 @@ def _fit(columns: list[_Column], width: int, *, minor: tuple[str, ...]) -> list[
     def fits(some: list[_Column]) -> bool:
         return len(some) <= 2 or sum(item.least + 3 for item in some) <= room  # noqa: PLR2004
 
-    kept = list(columns)
-    if not fits(kept):
-        kept = [column for column in kept if column.name not in minor]
-    while not fits(kept):
-        kept.pop()
-    while (excess := sum(item.width + 3 for item in kept) - room) > 0:
-        wide = [item for item in kept if item.width > item.least]
+    fitting = list(columns)
+    if not fits(fitting):
+        fitting = [column for column in fitting if column.name not in minor]
+    while not fits(fitting):
+        fitting.pop()
+    while (excess := sum(item.width + 3 for item in fitting) - room) > 0:
+        wide = [item for item in fitting if item.width > item.least]
         if not wide:
             break
         widest = max(wide, key=lambda item: item.width)
         others = [item.width for item in wide if item.width < widest.width]
         target = max([widest.least, widest.width - excess, *others])
         widest.width = target if target < widest.width else widest.width - 1
-    return kept
+    return fitting
 
 
 def print_table(table: Table) -> None:
@@ -210,16 +210,16 @@ def print_table(table: Table) -> None:
         _Column.of(visible(name), [row[number] for row in texts])
         for number, name in enumerate(table.columns)
     ]
-    kept = _fit(columns, width, minor=table.minor)
+    fitting = _fit(columns, width, minor=table.minor)
     grid = parts.Table()
-    for column in kept:
+    for column in fitting:
         justify: Literal["left", "right"] = "right" if column.numeric else "left"
         grid.add_column(Text(column.name), overflow="fold", justify=justify, width=column.width)
-    for row in zip(*(column.texts for column in kept), strict=True):
+    for row in zip(*(column.texts for column in fitting), strict=True):
         grid.add_row(*map(Text, row))
     say_sentence(table.title)
     Console(file=sys.stdout, width=width).print(grid)
-    if left_out := [column.name for column in columns if column not in kept]:
+    if left_out := [column.name for column in columns if column not in fitting]:
         say_sentence(f"Not shown, for lack of room: {', '.join(left_out)}.")
     if table.note:
         say_sentence(table.note)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization import Location
 
 SIDE_M = 1200.0  # of the square town
-VIEWS = 60  # of which one that is answered and one that is not are shown
+VIEWS = 60  # one that is answered and one that is not are shown
 OBJECTS = range(3, 9)  # in a view that is shown
 
 
@@ -155,8 +155,8 @@ class Demo:
                 answer=answer,
             )
 
-        drawn = draw_queries(city.database, spec, store=city.store)
-        views = [view for view in drawn if len(view.asked) in OBJECTS]
+        queries = draw_queries(city.database, spec, store=city.store)
+        views = [view for view in queries if len(view.asked) in OBJECTS]
         # Few places see many objects of many classes, and many places few objects of one class.
         views.sort(key=lambda view: (-len(set(view.asked.codes.tolist())), -len(view.asked)))
         certain = (item for item in map(example, views) if item.answer.answer.given)

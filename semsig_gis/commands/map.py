@@ -168,7 +168,7 @@ class Map:
             "where a view may be from": self.location,
             "street objects": self.objects,
         }
-        return [words for words, given in layers.items() if given]
+        return [words for words, value in layers.items() if value]
 
     def _objects(self, city: City) -> dict[str, Any]:
         """Return the street objects, which lie where the database does."""

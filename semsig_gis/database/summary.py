@@ -50,7 +50,7 @@ def database_summary(
         ``"objects"`` or ``"occurrences"``; ``cell_bits``; ``groups``: for ``type``,
         ``angle`` and ``both`` the statistics of the group sizes from
         `pandas.Series.describe` (``std`` is that of a sample, None for a single group),
-        ``alone`` (share of the cells with a unique signature) and ``entropy_bits``;
+        ``unique`` (share of the cells with a unique signature) and ``entropy_bits``;
         ``largest_type_group``: ``types`` and ``cells``.
 
     Notes
@@ -168,6 +168,6 @@ def _group_statistics(sizes: NDArray[np.int64]) -> dict[str, float | int | None]
     for name in ("mean", "std", "25%", "50%", "75%"):
         value = float(described[name])
         statistics[name] = None if np.isnan(value) else value
-    statistics["alone"] = int(np.count_nonzero(sizes == 1)) / int(sizes.sum())
+    statistics["unique"] = int(np.count_nonzero(sizes == 1)) / int(sizes.sum())
     statistics["entropy_bits"] = _entropy(sizes)
     return statistics

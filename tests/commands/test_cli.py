@@ -325,17 +325,17 @@ def test_demo_shows_an_answer_a_doubt_and_a_command_to_type(
     for name in ("place.html", "map.html", "report.html", "city.gpkg", "city.parquet"):
         assert f": demo/{name}\n" in out
         assert (tmp_path / "demo" / name).stat().st_size > 0
-    said = " ".join(out.split())
-    assert said.startswith("A made-up town: ")
-    assert said.count("you would see: ") == said.count("semsig says: ") == 2
-    assert re.search(r"within 50 m with a chance of [^.]* %\. In truth, it is \d+ m off\.", said)
-    assert "semsig says: Cannot tell." in said
-    assert "Of 5 views, " in said
+    output = " ".join(out.split())
+    assert output.startswith("A made-up town: ")
+    assert output.count("you would see: ") == output.count("semsig says: ") == 2
+    assert re.search(r"within 50 m with a chance of [^.]* %\. In truth, it is \d+ m off\.", output)
+    assert "semsig says: Cannot tell." in output
+    assert "Of 5 views, " in output
     # The command to type gives the answer that was shown.
     (line,) = [line for line in out.splitlines() if line.startswith("  semsig localize ")]
     _, *words = shlex.split(line)
     answer = run_ok("", *words)
-    assert " ".join(answer.split()).partition(" with ")[0] in said
+    assert " ".join(answer.split()).partition(" with ")[0] in output
     page = text("demo/place.html")
     assert "Street " in page
 
@@ -459,8 +459,8 @@ def test_sentence_is_printed_as_understood(run_ok: RunOk, method: str) -> None:
     for note, words in zip(answer["notes"], notes, strict=True):
         assert words in note
     out = run_ok(*query)
-    seen = "street light at 80° 7.3 m away, crossing at 120° 25 m away, street light at 200°"
-    assert f"Seen: {seen}; looked at 55 to 125°." in " ".join(out.split())
+    objects = "street light at 80° 7.3 m away, crossing at 120° 25 m away, street light at 200°"
+    assert f"Seen: {objects}; looked at 55 to 125°." in " ".join(out.split())
     # The query in an answer can be given again.
     Path("queries.jsonl").write_text(json.dumps(view | {"id": "again"}))
     noise = ("--noise", "by-hand") if method == "likelihood" else ()

@@ -53,7 +53,7 @@ GROUPS: Mapping[str, tuple[str, str]] = {
     "max": ("29,958", "1,240"),
     # Of its 10,000 queries. It must be by type: at least 75 % of the 204,891 angle groups have one
     # cell, which is 49 % of the cells or more.
-    "alone": ("41.8 %", ""),
+    "unique": ("41.8 %", ""),
     "entropy_bits": ("", ""),
 }
 # P(error <= 50 m) and recall at 10 % of its two-stage edit+edit at 5 %, medium distortion, t = 1,

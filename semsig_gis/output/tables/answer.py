@@ -246,8 +246,8 @@ def _candidate_table(
         low, high = (row.get(name, row.get("rank")) for name in ("rank_low", "rank_high"))
         rank = f"{low:,}" if low == high else f"{low}-{high}"
         position = _position(row["x"], row["y"], row["lon"], row["lat"])
-        seen = _classes_text(row["types"], answer.taxonomy, symbols=symbols)
-        rows.append((rank, str(row["cell_id"]), *position, score_text(row[score]), seen))
+        classes = _classes_text(row["types"], answer.taxonomy, symbols=symbols)
+        rows.append((rank, str(row["cell_id"]), *position, score_text(row[score]), classes))
     heads = ("rank", "cell", *POSITION, score, SEEN_THERE)
     return Table(title, heads, tuple(rows), minor=MINOR)
 

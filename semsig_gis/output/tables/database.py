@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import Companion, SignatureDatabase
 
 MOST_TYPES = 20  # objects that fit into a table
-GROUP_LABELS = {"alone": "cells in a group of one", "entropy_bits": "entropy, in bits"}
+GROUP_LABELS = {"unique": "cells in a group of one", "entropy_bits": "entropy, in bits"}
 
 
 def database_tables(
@@ -50,11 +50,11 @@ def database_sentences(facts: Mapping[str, Any], *, symbols: bool = False) -> It
     yield (
         f"{facts['signatures']:,} cells of {facts['step_m']:g} m see {facts['mean_length']:.1f} "
         f"street objects on average, up to {facts['radius_m']:g} m away; "
-        f"{percent(facts['groups']['type']['alone'], 0)} of them see classes in an order that no "
+        f"{percent(facts['groups']['type']['unique'], 0)} of them see classes in an order that no "
         "other cell sees."
     )
-    seen = sorted(facts["occurrences"], key=lambda item: -item["number"])
-    names = (class_label(item, symbols=symbols) for item in seen if item["number"])
+    items = sorted(facts["occurrences"], key=lambda item: -item["number"])
+    names = (class_label(item, symbols=symbols) for item in items if item["number"])
     yield f"Seen: {', '.join(names)}."
 
 
@@ -191,7 +191,7 @@ def _statistic_text(name: str, value: float | None) -> str:
     """Return one statistic of group sizes as text."""
     if value is None:
         return ""
-    if name == "alone":
+    if name == "unique":
         return percent(value, 1)
     if name == "entropy_bits":
         return f"{value:.2f}"

@@ -67,8 +67,8 @@ def method_words(method: AnyMethod) -> str:
         f"north ± {sigma:g}°": 0.0 < sigma < math.inf,
         "north unknown": sigma == math.inf,
     }
-    given = (name for name, applies in settings.items() if applies)
-    return ", ".join([LIKELIHOOD, f"noise: {method.noise.name}", *given])
+    names = (name for name, applies in settings.items() if applies)
+    return ", ".join([LIKELIHOOD, f"noise: {method.noise.name}", *names])
 
 
 KILOMETRE = 1000.0

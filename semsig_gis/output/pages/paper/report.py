@@ -206,7 +206,7 @@ def _database_section(results: Reproduction) -> Section:
             numbers.append(Number(row, "", ours, paper=paper, decimals=decimals))
     for part, paper_share in (("type", paris.UNAMBIGUOUS), ("angle", None)):
         row = f"cells in a group of one, by {part}"
-        ours = facts["groups"][part]["alone"]
+        ours = facts["groups"][part]["unique"]
         numbers.append(Number(row, "", ours, paper=paper_share, decimals=3))
     return _section(
         "database",
