@@ -341,7 +341,7 @@ def _turned(rows: NDArray[np.float32]) -> NDArray[np.float32]:
     return turned
 
 
-def _wrapped_normal(away: NDArray[np.float64], sigma: NDArray[np.floating]) -> NDArray[np.float64]:
+def _wrapped_normal(away: NDArray[np.floating], sigma: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the density of deviations in degrees from one turn away, for each of some sigmas."""
     density = np.zeros((*sigma.shape, len(away)))
     for lap in LAPS:
