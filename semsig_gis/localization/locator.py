@@ -412,8 +412,10 @@ def localize_many(
         return {"taxonomy": dataset.taxonomy, "radius": dataset.spec.radius}
 
     def answer(item: AnyView) -> Location | Localization:
-        is_view = isinstance(item, Signature)
-        description = Description(view=item) if is_view else read_description(item, **words())
+        if isinstance(item, Signature):
+            description = Description(view=item)
+        else:
+            description = read_description(item, **words())
         noise = usual_noise(description.view, in_words=description.in_words)
         locator = locator_for(noise if usual else "")
         unplaced, absent = description.unplaced, description.absent
