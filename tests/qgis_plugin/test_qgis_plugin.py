@@ -292,7 +292,7 @@ def session(qgis: Qgis, package: SimpleNamespace) -> dict[str, Any]:
 def test_parameters_are_those_of_the_schema(session: dict[str, Any], name: str) -> None:
     command, tool = commands()[name], session["tools"][name]
     assert (tool["title"].lstrip("1234. "), tool["group"]) == (command.title, command.group)
-    hidden = {"localize": {"more", "queries", "adapt"}}.get(name, set())
+    hidden = {"localize": {"more", "queries", "adapt", "symbols"}}.get(name, set())
     fields = [field for field in command.fields if field.name not in hidden]
     parameters = dict(tool["parameters"])
     for extra in {"build": ["CELLS"], "draft": ["OUT"], "evaluate": ["LAYERS", "MAP"],
