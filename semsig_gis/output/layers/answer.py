@@ -222,11 +222,10 @@ def answer_layers(
             styles=(by_rank(str(rank), geometry="point"),),
         ),
     ]
-    shapes = candidates.geometry.to_numpy()[:last]
-    if isinstance(answer, Location):
-        shapes = np.append(shapes, shapely.Point(answer.xy))
+    # A method by distance has its first candidate as the best place.
+    places = [*candidates.geometry[:last], shapely.Point(answer.xy)]
     below = ((streets_layer, streets), (buildings_layer, buildings))
-    ground = [make(database, table, shapes) for make, table in below if table is not None]
+    ground = [make(database, table, np.array(places)) for make, table in below if table is not None]
     ground = [layer for layer in ground if layer.rows]
     if not isinstance(answer, Location):
         return layers + ground

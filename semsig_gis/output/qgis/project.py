@@ -146,7 +146,9 @@ def shown_layers(layers: Sequence[Layer], file: str) -> list[ShownLayer]:
 def project_archive(layers: Sequence[Layer], shown: Sequence[ShownLayer], title: str) -> bytes:
     """Return a project of QGIS (``.qgz``) with layers of one GeoPackage."""
     spatial = [layer for layer in layers if layer.geometry != "none"]
-    credit = [*dict.fromkeys(line for item in shown for line in item.licences)]
+    # Without the names of the layers of the source, which the properties of a layer have.
+    lines = (line.partition(": ")[0] for item in shown for line in item.licences)
+    credit = [*dict.fromkeys(lines)]
     if len(credit) > CREDITS:  # the page has room for a few lines
         rest = f"and {len(credit) - CREDITS + 1} more, which the properties of the layers name"
         credit[CREDITS - 1 :] = [rest]

@@ -89,10 +89,12 @@ def _layers(symbol: Symbol, geometry: str) -> tuple[SymbolLayer, ...]:
     if geometry == "line":
         line = {"line_color": _rgba(colour, opacity), "line_width": 0.26, "line_style": "solid"}
         if not symbol.shape:
-            width = {}
+            width: Options = {}
             if symbol.metres:
-                limits = {"smallest": symbol.least_mm, "largest": LARGEST_MM}
-                width = _metres(symbol.metres, length="line_width", **limits)
+                smallest, largest = symbol.least_mm, LARGEST_MM
+                width = _metres(
+                    symbol.metres, smallest=smallest, largest=largest, length="line_width"
+                )
             return (("SimpleLine", {**line, **width, "capstyle": "round", "joinstyle": "round"}),)
         end = {"placement": "lastvertex", "rotate": 0}
         return ("SimpleLine", line), ("MarkerLine", end, _marker(symbol))
