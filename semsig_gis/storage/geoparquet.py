@@ -367,8 +367,8 @@ def read_geoparquet(
         crs = _crs_of(json.dumps(parse_json(metadata[b"geo"])["columns"]["geometry"]["crs"]))
         stored = specs["kind"]
     except (KeyError, TypeError, ValueError, CRSError) as error:
-        other = file_kind(file)
-        what = f"holds {other}" if other else "was not written by semsig"
+        use = "" if SPEC_KEY in metadata else file_kind(file)  # else its CRS is wrong
+        what = f"holds {use}" if use else "was not written by semsig"
         raise DatabaseError(f"{file} {what}; give a {kind} file.") from error
     if stored != kind:
         raise DatabaseError(f"{file} is a {stored} file; give a {kind} file.")
