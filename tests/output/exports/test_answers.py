@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from html import escape
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
@@ -97,3 +98,18 @@ def test_files_have_the_licences_and_load_no_other_files(tmp_path: Path) -> None
     first = collection["features"][0]["properties"]
     # Integers stay integers, although they are missing in other rows.
     assert (first["Name"], repr(first["rank"])) == ("region 1", "1")
+
+
+def test_places_of_kml_have_links_to_follow(tmp_path: Path) -> None:
+    location = small_location()
+    export_answer(location, small_city()[0], tmp_path / "a.kml")
+    document = ET.parse(tmp_path / "a.kml").getroot()  # noqa: S314 - ours
+    texts = {
+        mark.findtext(f"{KML}name"): mark.findtext(f"{KML}description") or ""
+        for mark in document.iter(f"{KML}Placemark")
+    }
+    for title, link in location.links.items():
+        assert f'<a href="{escape(link)}">{title}</a>' in texts["place"]
+    assert "Chance: " in texts["place"]
+    assert "<a " in texts["candidate 1"]
+    assert "<a " not in texts["region 1"]
