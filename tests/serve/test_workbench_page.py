@@ -86,7 +86,7 @@ def test_two_photos_are_localized_saved_and_exported(
     sentence = sentences[-1]
     times = "return performance.getEntriesByName('semsig-answer').map(({duration}) => duration)"
     sys.stdout.write(f"a change is answered in {np.median(workbench.ask(times)):.0f} ms\n")
-    answer_match = re.match(r"Within 50 m of ([\d.]+), ([\d.]+) with a chance of .*%\.", sentence)
+    answer_match = re.match(r"Within 50 m of ([\d.]+), ([\d.]+) .*with a chance of .*%\.", sentence)
     assert answer_match, sentence
     true = to_latlon(page.bench.database.xy[[PLACE]], page.bench.database.crs)[0]
     assert workbench.ask(DISTANCE, true.tolist(), list(map(float, answer_match.groups()))) < 50
