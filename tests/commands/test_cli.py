@@ -85,7 +85,7 @@ def test_load_build_and_localize(run_ok: RunOk) -> None:
     out = run_ok(query, "-v")
     assert "(noise: generic)" in out
     assert re.search(r"│ (\d × )?street light", out)
-    assert re.search(r"│ [DX]+ +│", run_ok(query, "--tables --symbols"))
+    assert re.search(r"│ [DX]+ +│", run_ok(query, "--tables", "--symbols"))
     assert "https://www.openstreetmap.org/?mlat=" in out
     assert "leaflet" in text("query.html").lower()
 
