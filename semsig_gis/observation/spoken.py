@@ -46,7 +46,7 @@ ADJECTIVES_FIRST = frozenset({"en", "de"})
 
 _TOKEN = re.compile(
     r"(?P<tag>[\w:]+ ?= ?[\w:*]+)"
-    r"|(?P<number>(?<!\w)[-+]?\d+(?:\.\d+)?|\d+(?:\.\d+)?)"
+    r"|(?P<number>(?<!\w)[-+]?\d+(?:[.,]\d+)?|\d+(?:[.,]\d+)?)"
     r"|(?P<word>[^\W\d_]+(?:_[^\W\d_]+)*|[°@?])"
     r"|(?P<end>[,;\n])"
 )
@@ -105,35 +105,78 @@ def read_sentence(text: str, taxonomy: Taxonomy) -> Sentence:
     """
     tokens = [*_TOKEN.finditer(text.replace("º", "°"))]
     vocabulary = Vocabulary.of([match["word"] for match in tokens if match["word"]], taxonomy)
+    parts = [*_parts(_items(tokens, vocabulary, taxonomy), vocabulary)]
     look: Row = {}
+    for part in parts:
+        if part.heading is not None and look:
+            raise InputError(f"{part.text!r} is a second direction of sight; give it once.")
+        if part.heading is not None:
+            look = {"heading": part.heading}
+            if part.heading_error:
+                look["heading_error"] = part.heading_error
+    things = _things(parts, vocabulary)
+    if text.strip() and not things:
+        raise _without_thing(text)
+    return _sentence(things, look, taxonomy)
+
+
+def _things(parts: Iterable[_Part], vocabulary: Vocabulary) -> list[_Part]:
+    """Return the parts with a thing; the others give them their direction or distance."""
     things: list[_Part] = []
     waiting: _Part | None = None  # a direction before its thing
-    for part in _parts(_items(tokens, vocabulary, taxonomy), vocabulary):
-        if part.heading is not None:
-            look = {"heading": part.heading, "heading_error": POINT_ERROR}
+    for part in parts:
         last = things[-1] if things else None
-        if part.codes:
+        if part.codes or part.others or part.absent:
             part.check(vocabulary, last)
             if waiting is not None:
                 part.take(waiting)
-                waiting = None
+                part.led, waiting = True, None
             things.append(part)
-        elif part.others or part.absent:
-            raise _unknown_class(part, vocabulary)
-        elif last is not None and part.says_where and last.can_take(part):
+        elif not part.says_where:
+            continue
+        elif last is not None and last.can_take(part):
             last.take(part)
-        elif part.says_where:
+        elif part.joined and last is not None and not (last.absent or last.led):
+            raise _without_thing(part.text)
+        elif waiting is not None:
+            waiting.take(part)
+        else:
             waiting = part
-    if waiting is not None or (text.strip() and not things):
-        words = text if waiting is None else waiting.text
-        raise InputError(
-            f"{words!r} does not say what is there; say what was seen, such as 'bench at 40'."
-        )
-    return _sentence(things, look, taxonomy)
+    if waiting is not None:
+        raise _without_thing(waiting.text)
+    return things
+
+
+def _point_error(bearing: float) -> float:
+    """Return the standard deviation of a point of the compass."""
+    return FINE_POINT_ERROR if bearing % (RIGHT / 2.0) else POINT_ERROR
+
+
+def _absent_unnamed(text: str) -> InputError:
+    return InputError(
+        f"{text!r} does not say what is not in sight; name it, such as 'no bench, no tree', or "
+        "leave this out."
+    )
+
+
+def _without_thing(text: str) -> InputError:
+    return InputError(
+        f"{text!r} does not say what is there; say what was seen where, such as 'bench at 40', and "
+        "give each thing its own direction."
+    )
 
 
 def _sentence(things: Sequence[_Part], look: Row, taxonomy: Taxonomy) -> Sentence:
     """Return what the things of a sentence say; `look` has the direction of sight."""
+    elsewhere = [thing for thing in things if thing.elsewhere]
+    things = [thing for thing in things if not thing.elsewhere]
+    if elsewhere and not things:
+        words = ", ".join(thing.elsewhere for thing in elsewhere)
+        raise InputError(f"the map has no {words}; say what else is there.")
+    notes = [
+        f"{thing.text!r} was not used, because the map has no {thing.elsewhere}."
+        for thing in elsewhere
+    ]
     pairs = [(thing, thing.place()) for thing in things if not thing.absent]
     rows: list[Row] = [
         {"class": taxonomy.decode(thing.codes), **place, "range": thing.range}
@@ -141,11 +184,20 @@ def _sentence(things: Sequence[_Part], look: Row, taxonomy: Taxonomy) -> Sentenc
         if place
         for _ in range(thing.count)
     ]
+    if look and any("bearing" in row for row in rows):
+        # Of directions from north, only those from the direction of sight have its error.
+        look = dict(look)
+        error = look.pop("heading_error", 0.0)
+        for row in rows:
+            if "offset" in row and error:
+                row["bearing_error"] = math.hypot(row.get("bearing_error", 0.0), error)
     others = [thing for thing, place in pairs if not place]
     unplaced = [code for thing in others for code in thing.codes * thing.count]
     if not rows:
         rows, unplaced = [{"class": taxonomy.decode([code])} for code in unplaced], []
-    notes = [f"{word!r} was not used." for thing in things for word in thing.others]
+    notes += [f"{word!r} was not used." for thing in things for word in thing.others]
+    if WILDCARD in unplaced:
+        notes.append("something in an unknown direction was not used.")
     notes += [
         f"the distance in {thing.text!r} was not used, because it has no direction."
         for thing in others
@@ -154,14 +206,22 @@ def _sentence(things: Sequence[_Part], look: Row, taxonomy: Taxonomy) -> Sentenc
     return Sentence(
         row={"detections": rows, **look},
         notes=tuple(notes),
-        unplaced=tuple(unplaced),
+        unplaced=tuple(code for code in unplaced if code != WILDCARD),
         absent=tuple(code for thing in things if thing.absent for code in thing.codes),
     )
 
 
-def _unknown_class(part: _Part, vocabulary: Vocabulary) -> UnknownNameError:
-    word = " ".join(part.others) or part.text
-    return UnknownNameError(
+def _elsewhere(part: _Part, vocabulary: Vocabulary) -> str:
+    """Return the words of a part for a class that only other cities have.
+
+    UnknownNameError if there are none.
+    """
+    if not part.others:
+        raise _absent_unnamed(part.text)
+    if words := vocabulary.elsewhere(part.others):
+        return words
+    word = " ".join(part.others)
+    raise UnknownNameError(
         f"class {word!r} is unknown{vocabulary.nearest(word)}; `semsig info` lists the classes of "
         "a city, and `semsig sources` those of a catalogue."
     )
@@ -190,7 +250,7 @@ def _items(
         if token["end"]:
             item = _Item("end", None, text)
         elif token["number"]:
-            item = _Item("number", float(text), text)
+            item = _Item("number", float(text.replace(",", ".")), text)
         elif token["tag"]:
             item = _Item("thing", class_code(text, taxonomy), text)
         else:
@@ -253,7 +313,7 @@ def _part(items: list[_Item], vocabulary: Vocabulary, *, joined: bool) -> _Part:
                 del items[0]
             else:
                 unit = part.unit(item, before, items)
-            item = replace(item, kind=unit)
+            item = replace(item, kind=unit if unit != "count" or item.value else "none")
         elif item.kind in UNITS:
             item = replace(item, kind="other")
         part.add(item)
@@ -269,7 +329,9 @@ class _Part:
 
     `words` are those for things and those without a meaning, each with the number of its run, which
     ends at a direction. `points`, `turns`, `hours` and `degrees` are directions; `heading` is the
-    direction of sight. `joined` is whether the part follows a word such as "and".
+    direction of sight, and `heading_error` its standard deviation. `joined` is whether the part
+    follows a word such as "and", and `led` whether its direction comes before its thing.
+    `elsewhere` are words for a thing that only other cities have.
     """
 
     text: str
@@ -280,6 +342,7 @@ class _Part:
     facing: bool = False
     within: bool = False
     heading: float | None = None
+    heading_error: float = 0.0
     points: list[float] = field(default_factory=list)
     turns: list[float] = field(default_factory=list)
     hours: list[float] = field(default_factory=list)
@@ -287,6 +350,8 @@ class _Part:
     range: str | None = None
     words: list[tuple[int, _Item]] = field(default_factory=list)
     run: int = 0
+    led: bool = False
+    elsewhere: str = ""
 
     @property
     def others(self) -> list[str]:
@@ -312,7 +377,9 @@ class _Part:
         )
 
     def take(self, other: _Part) -> None:
-        """Add the direction and the distance of another part."""
+        """Add the direction and the distance of another part; InputError if there are others."""
+        if not self.can_take(other):
+            raise _without_thing(other.text)
         self.text += f", {other.text}"
         for name in DIRECTIONS.values():
             getattr(self, name).extend(getattr(other, name))
@@ -325,7 +392,7 @@ class _Part:
             return "hours"
         if before == "at" or after == "turn":
             return "degrees"
-        whole = number.value in range(1, MOST_COUNT + 1)
+        whole = number.value in range(MOST_COUNT + 1)
         if whole and not self.codes and after in {"thing", "symbol", "other"}:
             return "count"
         if before == "turn":
@@ -340,6 +407,7 @@ class _Part:
         kind, value = item.kind, item.value
         if kind in {"thing", "other"}:
             self.words.append((self.run, item))
+            self.led = self.led or self.directed
             self.codes += [value] if kind == "thing" else []
             return
         if kind == "skip":
@@ -347,6 +415,7 @@ class _Part:
         self.run += 1
         if kind in {"compass", "degrees"} and self.facing and self.heading is None:
             self.heading = value
+            self.heading_error = _point_error(value) if kind == "compass" else 0.0
         elif kind in DIRECTIONS:
             getattr(self, DIRECTIONS[kind]).append(value)
         elif kind in FLAGS:
@@ -354,12 +423,17 @@ class _Part:
         elif kind == "count":
             self.count = int(value)
         elif kind == "metres":
+            if self.range is not None and self.range.endswith(" m"):
+                raise InputError(f"{self.text!r} has two distances; give one.")
             self.range = f"within {value:g} m" if self.within else f"{value:g} m"
         elif kind == "range":
             self.range = self.range or value
 
     def check(self, vocabulary: Vocabulary, last: _Part | None) -> None:
         """Raise InputError for words that are not understood, or for several things."""
+        if not self.codes:
+            self.elsewhere = _elsewhere(self, vocabulary)
+            return
         runs = {run for run, item in self.words if item.kind != "other"}
         strange = [item.text for run, item in self.words if run not in runs]
         if vocabulary.language in ADJECTIVES_FIRST:
@@ -378,6 +452,8 @@ class _Part:
                 f"{self.text!r} names several things; put a comma between them, and give each its "
                 "own direction."
             )
+        if self.absent and WILDCARD in self.codes:
+            raise _absent_unnamed(self.text)
         if self.absent and self.says_where:
             raise InputError(
                 f"{self.text!r} says where something is not; say only what is nowhere in sight."
@@ -406,8 +482,7 @@ class _Part:
                 away = (along + RIGHT) / 2.0
                 place = {"offset": math.copysign(away, side), "bearing_error": POINT_ERROR}
             case 0, 0, 1, 0:
-                error = FINE_POINT_ERROR if points[0] % (RIGHT / 2.0) else POINT_ERROR
-                place = {"bearing": points[0], "bearing_error": error}
+                place = {"bearing": points[0], "bearing_error": _point_error(points[0])}
             case 0, 0, 0, 1 if 1 <= self.hours[0] <= HOURS:
                 offset = self.hours[0] % HOURS * (FULL_TURN / HOURS)
                 place = {"offset": offset, "bearing_error": HOUR_ERROR}

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import nearest_name
-from semsig_gis.sources import class_words, data_folder, words_of
+from semsig_gis.sources import class_words, data_folder, other_class_words, words_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Container, Mapping, Sequence
 
     from semsig_gis.core import Taxonomy
 
@@ -28,6 +28,8 @@ LONGEST = 6
 """Words in the longest phrase."""
 
 Words = tuple[str, ...]
+Terms = tuple[tuple[str, int, str], ...]
+"""Words for things, each with its language and class code."""
 Meaning = tuple[str, Any]
 """The kind of a phrase, and its value."""
 
@@ -51,8 +53,9 @@ def is_point(word: str) -> bool:
 class Vocabulary:
     """The words of a language, then those of the other languages that have one meaning.
 
-    `classes` are class codes by the words of a thing, joined and in any form; `phrases` are
-    meanings by words, `letters` bearings by capitals, and `names` words for things of the language.
+    `classes` are class codes by the words of a thing, joined and in any form, and `others` such
+    words for things that the taxonomy has no class for; `phrases` are meanings by words, `letters`
+    bearings by capitals, and `names` words for things of the language.
     """
 
     language: str
@@ -60,6 +63,7 @@ class Vocabulary:
     phrases: Mapping[Words, Meaning]
     letters: Mapping[str, float]
     names: tuple[str, ...]
+    others: Container[str]
 
     @classmethod
     def of(cls, words: Sequence[str], taxonomy: Taxonomy) -> Vocabulary:
@@ -72,7 +76,7 @@ class Vocabulary:
                 word in letters if is_point(word) else plain_word(word) in own for word in words
             )
 
-        return _vocabulary(terms, max(_phrases(), key=count))
+        return _vocabulary(terms, other_class_words(taxonomy), max(_phrases(), key=count))
 
     def class_of(self, words: Sequence[str]) -> int | None:
         """Return the class code for the words of a thing, None if they are for no class."""
@@ -81,6 +85,13 @@ class Vocabulary:
         if not names[0] or not names[-1] or min(len(words[0]), len(words[-1])) == 1:
             return None
         return self.classes.get("".join(itertools.chain(*names)))
+
+    def elsewhere(self, words: Sequence[str]) -> str:
+        """Return the last of some words that are for a thing without a class here, or nothing."""
+        for start in range(len(words)):
+            if "".join(itertools.chain(*map(words_of, words[start:]))) in self.others:
+                return " ".join(words[start:])
+        return ""
 
     def meaning(self, words: Sequence[str]) -> Meaning | None:
         """Return the kind and the value of a phrase, None if it has no meaning."""
@@ -131,8 +142,8 @@ def _forms(phrase: str, endings: Sequence[str]) -> set[str]:
     return {"".join(words) for words in itertools.product(*forms)} - {""}
 
 
-@functools.lru_cache(maxsize=64)
-def _vocabulary(terms: tuple[tuple[str, int, str], ...], language: str) -> Vocabulary:
+def _by_form(terms: Terms, language: str) -> dict[str, int]:
+    """Return the class codes by the words of a thing in any form."""
     classes: dict[str, int] = {}
     # All words as they are go before their forms, the own language before others.
     for exact in (True, False):
@@ -141,18 +152,24 @@ def _vocabulary(terms: tuple[tuple[str, int, str], ...], language: str) -> Vocab
             for _, code, phrase in (item for item in terms if item[0] == name):
                 for form in _forms(phrase, endings):
                     classes.setdefault(form, code)
+    return classes
+
+
+@functools.lru_cache(maxsize=64)
+def _vocabulary(terms: Terms, others: Terms, language: str) -> Vocabulary:
     names = tuple(word for name, _, word in terms if name in {"", language})
     return Vocabulary(
         language=language,
-        classes=classes,
+        classes=_by_form(terms, language),
         phrases={**_shared(), **_meanings(language)},
         letters=_phrases()[language]["letters"],
         names=names,
+        others=frozenset(_by_form(others, language)),
     )
 
 
 @functools.lru_cache(maxsize=64)
-def _own_words(terms: tuple[tuple[str, int, str], ...], language: str) -> frozenset[str]:
+def _own_words(terms: Terms, language: str) -> frozenset[str]:
     """Return the single words of a language."""
     endings = ["", *_phrases()[language]["endings"]]
     things = {

@@ -17,6 +17,7 @@ from .class_keywords import Match as Match
 from .class_keywords import class_code as class_code
 from .class_keywords import class_words as class_words
 from .class_keywords import keywords as keywords
+from .class_keywords import other_class_words as other_class_words
 from .class_keywords import words_of as words_of
 from .clip import BOX as BOX
 from .clip import NO_CLIP as NO_CLIP

@@ -13,7 +13,7 @@ from semsig_gis.core import WILDCARD, UnknownNameError, nearest_name
 from semsig_gis.sources.catalog import data_folder, load_catalog
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Mapping
+    from collections.abc import Container, Iterable, Iterator, Mapping
 
     from semsig_gis.core import Taxonomy
 
@@ -153,7 +153,7 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
     text = word.strip()
     if len(text) == 1:
         return int(taxonomy.encode(text)[0])
-    words = _class_words(class_words(taxonomy, languages={"en"}))
+    words = _class_words(taxonomy)
     code: int | None
     if "=" in text:
         key, _, value = (part.strip() for part in text.partition("="))
@@ -191,22 +191,37 @@ def class_words(
     The language of names and titles is empty, because they may be in any. Words that only people
     say may be limited to the languages `languages`.
     """
-    lists = _content()["classes"]
     words = [("", WILDCARD, "unknown")]
     for item in taxonomy.classes:
-        words += [("", item.code, item.name.replace("_", " ")), ("", item.code, item.title)]
-        by_key = dict(lists.get(item.name, {}))
-        more = by_key.pop(SPOKEN, {}).items()
-        lists_of_words = [pair for pair in by_key.items() if pair[0] != "fields"]
-        lists_of_words += [pair for pair in more if languages is None or pair[0] in languages]
-        words += [(key, item.code, word) for key, phrases in lists_of_words for word in phrases]
+        words += [("", item.code, item.title), *_keywords(item.name, item.code, languages)]
     return tuple(words)
 
 
+def other_class_words(taxonomy: Taxonomy) -> tuple[tuple[str, int, str], ...]:
+    """Return the words of `class_words` for classes that a taxonomy has not, as of `WILDCARD`."""
+    own = {item.name for item in taxonomy.classes}
+    names = [name for name in _content()["classes"] if name not in own]
+    return tuple(item for name in names for item in _keywords(name, WILDCARD, None))
+
+
+def _keywords(
+    name: str, code: int, languages: Container[str] | None
+) -> Iterator[tuple[str, int, str]]:
+    """Yield the name of a class and its keywords, each with its language and a class code."""
+    yield "", code, name.replace("_", " ")
+    by_key = dict(_content()["classes"].get(name, {}))
+    more = by_key.pop(SPOKEN, {}).items()
+    lists = [pair for pair in by_key.items() if pair[0] != "fields"]
+    lists += [pair for pair in more if languages is None or pair[0] in languages]
+    for key, phrases in lists:
+        yield from ((key, code, word) for word in phrases)
+
+
 @functools.lru_cache(maxsize=8)
-def _class_words(classes: tuple[tuple[str, int, str], ...]) -> Mapping[str, tuple[int, str]]:
+def _class_words(taxonomy: Taxonomy) -> Mapping[str, tuple[int, str]]:
     """Return class code and original word by normalized word (lower case, no blanks)."""
     code_of: dict[str, tuple[int, str]] = {}
+    classes = class_words(taxonomy, languages={"en"})
     # Names and titles have priority, then English.
     for _, code, word in sorted(classes, key=lambda item: (item[0] != "", item[0] != "en")):
         if joined := "".join(words_of(word)):

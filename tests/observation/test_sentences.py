@@ -191,6 +191,20 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"see": "I see the"}, "'I see the' does not say what is there; say what was seen"),
     ({"see": "''"}, "does not say what is there"),
     ({"see": "lamp at 2, on the left"}, "'on the left' does not say what is there"),
+    ({"see": "tree left and right, bench behind"}, "'right' does not say what is there"),
+    ({"see": "tree to the left and to the right, bench"}, "'to the right' does not say what"),
+    ({"see": "ahead, on the left, a bench"}, "does not say what is there"),
+    ({"see": "on the left, no bench, lamp"}, "'on the left' does not say what is there"),
+    ({"see": "bench 10 m or 20 m ahead"}, "has two distances"),
+    ({"see": "facing north, facing south, bench left"}, "second direction of sight"),
+    ({"see": "nothing on the left"}, "does not say what is not in sight; name it"),
+    ({"see": "bench left, nothing else"}, "'nothing else' does not say what is not in sight"),
+    ({"see": "rien à gauche, banc à droite"}, "does not say what is not in sight"),
+    ({"see": "no ?"}, "'no ?' does not say what is not in sight"),
+    ({"see": "bike rack left"}, "the map has no bike rack"),
+    ({"see": "lamp at 40,50,60"}, "the number 60 in '60' is not clear"),
+    ({"see": ","}, "',' does not say what is there"),
+    ({"see": ";;"}, "';;' does not say what is there"),
     ({"see": "one very old and a very big dark tree"}, "'very old'"),
     ({"see": "lamp left, tree NE"}, "say where you look"),
     ({"see": "facing north, lamp left", "heading": 20}, "give it once"),
@@ -307,6 +321,17 @@ def test_sentences_of_people_are_understood(language: str) -> None:
         ("two phone boxes NE", ["telephone at 45", "telephone at 45"]),
         ("c'è una fontana dietro di me", ["water_fountain +180"]),
         ("lamp near", ["street_light"]),
+        ("bench left 12,5 m, tree right", ["alignment_tree +90", "bench -90 12.5 m"]),
+        ("zero benches, lamp N", ["no bench", "street_light at 0"]),
+        ("0 benches, lamp N", ["no bench", "street_light at 0"]),
+        ("null Bänke, Baum links", ["alignment_tree -90", "no bench"]),
+        ("zéro banc, arbre à gauche", ["alignment_tree -90", "no bench"]),
+        ("cero bancos, farola a la izquierda", ["no bench", "street_light -90"]),
+        ("zero panchine, lampione a destra", ["no bench", "street_light +90"]),
+        ("nothing but a bench on the left", ["bench -90"]),
+        ("bench at 40, ?", ["bench at 40"]),
+        ("left a bench and on the right, a lamp", ["bench -90", "street_light +90"]),
+        ("on the left, 20 m away, a bench", ["bench -90 20 m"]),
     ],
 )
 def test_other_sentences(text: str, parts: list[str]) -> None:
@@ -322,11 +347,46 @@ def test_directions_in_words_have_errors() -> None:
     assert view.photos[0].north_sigma == 13.0
 
 
+@pytest.mark.parametrize(
+    ("text", "north", "errors"),
+    [
+        ("facing north, bench at 40, lamp at 80", None, None),
+        ("facing NE, bench 20 left, lamp on the right", 13.0, [None, 26.0]),
+        ("facing NNE, bench 20 left", 6.5, None),
+        ("facing 40 degrees, bench 20 left", None, None),
+        ("facing north, bench at 40, lamp 20 right", None, [13.0, None]),
+    ],
+)
+def test_error_of_the_direction_of_sight_is_for_directions_from_it(
+    text: str, north: float | None, errors: list[float | None] | None
+) -> None:
+    view = read({"see": text})
+    assert view.photos[0].north_sigma == north
+    assert parsed({"see": text}).get("bearing_errors") == errors
+
+
 def test_words_that_are_not_used_are_noted() -> None:
     assert read({"see": "green bench left"}).notes == ("'green' was not used.",)
     (note,) = read({"see": "bench at 10 m"}).notes
     assert "the distance in 'bench at 10 m' was not used" in note
+    (note,) = read({"see": "bench at 40, ?"}).notes
+    assert "something in an unknown direction was not used" in note
     assert read({"see": "un banc vert à gauche"}).notes == ("'vert' was not used.",)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("bike racks on the left, bench right", "bike racks"),
+        ("old bike rack, left, bench right", "bike rack"),
+        ("no bike rack, bench right", "bike rack"),
+        ("Fahrradständer links, Bank rechts", "Fahrradständer"),
+    ],
+)
+def test_things_that_only_other_maps_have_are_not_used(text: str, word: str) -> None:
+    assert understood_parts(text) == ["bench +90"]
+    (note,) = read({"see": text}).notes
+    assert f"the map has no {word}" in note
 
 
 @pytest.mark.parametrize(
