@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 import json
 import os
 import re
@@ -68,7 +69,8 @@ def _interrupt_at_end_of(descriptor: int) -> None:
 
 duration_said = threading.Event()
 """Whether a remark has said how long the present work takes."""
-MEASURED_S = 1.0  # of work, before the rest is estimated
+MEASURED_S = 2.0  # of work, two times, before the rest is estimated
+STEADY = 1.5  # largest ratio of the two rates
 PATIENCE_S = 2.0  # a progress bar appears only if the work takes longer
 
 _AMOUNT = r"[-+±]?(?:\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?|infinite)(?: ?(?:°|%|m|km|km²|m²|MB|s|ms))?"
@@ -266,19 +268,13 @@ def progress(
 
     duration_said.clear()
 
-    first: list[tuple[float, int]] = []
+    marks: list[tuple[float, int]] = []
 
     def advance(completed: int, total: int) -> None:
-        # Measured from the first part, which may take longer than the others.
-        now = time.perf_counter()
-        if not first:
-            first.append((now, completed))
-        began, before = first[0]
-        if completed > before and now - began >= MEASURED_S and not duration_said.is_set():
-            left = (now - began) * (total - completed) / (completed - before)
-            if left > LONG_S:
-                duration_said.set()
-                remark(f"{label} takes {duration(left)} more")
+        left = 0.0 if duration_said.is_set() else _seconds_left(marks, completed, total)
+        if left > LONG_S:
+            duration_said.set()
+            remark(f"{label} takes {duration(left)} more")
         count = f"{completed:,} of {total:,}" if total else f"{completed:,}"
         bar.update(task, completed=completed, total=total or None, count=count)
 
@@ -294,6 +290,25 @@ def progress(
             bar.stop()
     if verbose:
         remark(f"{label}: {time.perf_counter() - start:.1f} s")
+
+
+def _seconds_left(marks: list[tuple[float, int]], completed: int, total: int) -> float:
+    """Return how long work takes from now on, 0 before its rate is steady.
+
+    The first parts may take longer than the others, for example to compile or to load. `marks` are
+    times and what was finished, which this function continues.
+    """
+    now = time.perf_counter()
+    if marks and (completed <= marks[-1][1] or now - marks[-1][0] < MEASURED_S):
+        return 0.0
+    marks.append((now, completed))
+    paces = [
+        (later - earlier) / (after - before)
+        for (earlier, before), (later, after) in itertools.pairwise(marks[-3:])
+    ]
+    if len(paces) < 2 or max(paces) > STEADY * min(paces):  # noqa: PLR2004 - two rates
+        return 0.0
+    return sum(paces) / len(paces) * (total - completed)
 
 
 def _progress_lines(label: str) -> Callable[[int, int], None]:

@@ -13,7 +13,9 @@ from semsig_gis.commands.options import MOST_METRES, Scheduler, Workers, numbers
 from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from pyproj import CRS
 
     from semsig_gis.objects import StreetObjects
 
@@ -165,8 +167,6 @@ class Build:
             if self.ground and getattr(self, role) is None
         }
         defaults = {role: path for role, path in defaults.items() if path.is_file()}
-        ground = {role: getattr(self, role) for role in ROLES} | defaults
-        mode = self.viewpoints or ("all" if ground["buildings"] is None else "outdoor")
         in_tiles = self.tile is not None or self.workers or self.scheduler is not None
         if not in_tiles and self.out.suffix.lower() != ".parquet" and not self.out.is_dir():
             raise InputError(f"{self.out} cannot be written; the name must end in .parquet.")
@@ -174,10 +174,14 @@ class Build:
         spec = SignatureSpec(self.radius, self.levels)
         # The objects of tiles are read tile by tile; here only their CRS is needed.
         objects = open_objects(self.objects, box=EMPTY_BOX if in_tiles else None)
+        boxes = np.concatenate([*bounds_by_group(self.objects), np.empty((0, 4))])
+        near = (*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)) if len(boxes) else None
+        if near is not None:
+            defaults = self._in_place(defaults, objects.crs, near, reporter)
+        ground = {role: getattr(self, role) for role in ROLES} | defaults
+        mode = self.viewpoints or ("all" if ground["buildings"] is None else "outdoor")
         polygons = None
         if self.area is not None:
-            boxes = np.concatenate([*bounds_by_group(self.objects), np.empty((0, 4))])
-            near = (*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)) if len(boxes) else None
             polygons = read_area(self.area, crs=objects.crs, near=near)
         width = self.street_width / 2
         specs: dict[str, Any] = {
@@ -208,6 +212,27 @@ class Build:
             files={"signature database": self.out},
             notes=[self._found_note(defaults, mode)] if defaults else [],
         )
+
+    def _in_place(
+        self,
+        defaults: dict[Role, Path],
+        crs: CRS,
+        box: Sequence[float],
+        reporter: Reporter,
+    ) -> dict[Role, Path]:
+        """Return the files that were found and are where the street objects are; note others."""
+        from semsig_gis.objects import covers_place
+
+        given = {role: path for role in ROLES if (path := getattr(self, role)) is not None}
+        elsewhere = {
+            role: path
+            for role, path in {**defaults, **given}.items()
+            if not covers_place(path, crs=crs, box=box)
+        }
+        for role, path in elsewhere.items():
+            used = ", and are not used" if role in defaults else ""
+            reporter.remark(f"the {role} of {path} are not where the street objects are{used}")
+        return {role: path for role, path in defaults.items() if role not in elsewhere}
 
     def _build_whole(
         self,

@@ -72,8 +72,8 @@ class Import:
         values: Imported = {"database": str(self.out), "cells": cells}
         files = {"signature database": self.out}
         if self.objects is not None and contents.objects is not None:
+            save_ground(self.objects, remark=reporter.remark)  # a GeoPackage has none
             save_objects(contents.objects, self.objects, keep_order=True)
-            save_ground(self.objects)  # a GeoPackage has none
             values |= {"objects": str(self.objects), "street_objects": len(contents.objects)}
             files["street objects"] = self.objects
         save_database(contents.database, self.out)

@@ -175,12 +175,14 @@ class LoadOptions:
     def save(self, loaded: street_objects.Loaded) -> Result:
         """Write the objects and their surroundings; return their quality report."""
         notes = list(loaded.notes)
-        street_objects.save_objects(loaded.objects, self.out)
-        files = {"street objects": self.out} | street_objects.save_ground(
+        ground = street_objects.save_ground(
             self.out,
             buildings=loaded.buildings if self.ground and self.buildings is None else None,
             streets=loaded.streets if self.ground and self.streets is None else None,
+            remark=notes.append,
         )
+        street_objects.save_objects(loaded.objects, self.out)
+        files = {"street objects": self.out} | ground
         for what, table, path in (
             ("buildings", loaded.buildings, self.buildings),
             ("streets", loaded.streets, self.streets),

@@ -66,10 +66,14 @@ class Synthesize:
             advance(1, 2)
             surroundings = synthetic_surroundings(spec)
         objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
-        save_objects(objects, self.out / "objects.parquet")
-        files = {"street objects": self.out / "objects.parquet"} | save_ground(
-            self.out / "objects.parquet", **{layer.spec.role: layer.table for layer in surroundings}
+        path = self.out / "objects.parquet"
+        ground = save_ground(
+            path,
+            **{layer.spec.role: layer.table for layer in surroundings},
+            remark=reporter.remark,
         )
+        save_objects(objects, path)
+        files = {"street objects": path} | ground
         return Result(
             values=lambda: {"objects": len(objects), "files": [*map(str, files.values())]},
             summary=[f"A made-up city with {len(objects):,} street objects."],

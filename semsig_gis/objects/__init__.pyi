@@ -33,6 +33,7 @@ from .quality import QualityReport as QualityReport
 from .quality import quality_report as quality_report
 from .skipped_layers import layers_in_same_extracts as layers_in_same_extracts
 from .skipped_layers import read_small_layers as read_small_layers
+from .surroundings import covers_place as covers_place
 from .surroundings import ground_file as ground_file
 from .surroundings import read_area as read_area
 from .surroundings import read_surroundings as read_surroundings

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import shapely
+from pyproj import CRS, Transformer
+from pyproj.exceptions import ProjError
 
 from semsig_gis.core import CLASS_NAME, LICENSES, InputError, SourceError
 from semsig_gis.objects.table import layer_licences
@@ -34,6 +38,7 @@ from semsig_gis.storage import (
     WRITE_CHECKSUMS,
     add_footer_checksum,
     hilbert_order,
+    parse_json,
     whole_file,
 )
 
@@ -45,6 +50,10 @@ if TYPE_CHECKING:
     from semsig_gis.core import AnyCrs
     from semsig_gis.sources import GeometryKind, RawLayer
 
+GROUND = "semsig_ground"
+"""Key in the `attrs` of files by `save_ground`, which may be removed with the street objects."""
+NEAR_M = 1000.0
+"""Distance from the street objects of a city to its buildings and streets."""
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 KIND_OF: dict[str, GeometryKind] = {"buildings": "polygon", "streets": "line", "area": "polygon"}
 # Distance between points along the edges of a box, which are curves in the metric CRS: this is
@@ -76,7 +85,13 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
     ...     len(read_surroundings(file, role="buildings", crs="EPSG:2154", box=(0, 0, 9, 9)))
     1
     """
+    _save(table, path, {})
+
+
+def _save(table: gpd.GeoDataFrame, path: str | Path, marks: dict[str, Any]) -> None:
+    """Save buildings or streets with some more `attrs`."""
     ordered = table.iloc[hilbert_order(table.bounds.to_numpy())]
+    ordered.attrs = {key: table.attrs[key] for key in table.attrs if key != GROUND} | marks
     with whole_file(path) as partial:
         ordered.to_parquet(
             partial,
@@ -150,24 +165,65 @@ def save_ground(
     *,
     buildings: gpd.GeoDataFrame | None = None,
     streets: gpd.GeoDataFrame | None = None,
+    remark: Callable[[str], None],
 ) -> dict[str, Path]:
     """Save buildings and streets next to a file of street objects; return their files by role.
 
-    Files of earlier objects of that name are removed (see `ground_file`).
+    Files of earlier objects of that name are removed (see `ground_file`). InputError, and nothing
+    is written, if a file would be replaced that was not written by this function; where there is
+    nothing to write, such a file is left. `remark` is called with notes on such files.
     """
     roles: dict[Literal["buildings", "streets"], gpd.GeoDataFrame | None] = {
         "buildings": buildings,
         "streets": streets,
     }
-    written: dict[str, Path] = {}
-    for role, table in roles.items():
-        path = ground_file(objects, role)
-        if table is None or table.empty:
-            path.unlink(missing_ok=True)
-        else:
-            save_surroundings(table, path)
-            written[role] = path
-    return written
+    paths = {role: ground_file(objects, role) for role in roles}
+    present = [role for role in roles if paths[role].exists()]
+    foreign = [role for role in present if not _is_ground(paths[role])]
+    written = {
+        role: paths[role] for role, table in roles.items() if table is not None and len(table)
+    }
+    if others := [str(paths[role]) for role in foreign if role in written]:
+        raise InputError(
+            f"{' and '.join(others)} would be replaced, but semsig did not write it as part of "
+            f"{objects}; rename it, write to another file, or leave out --ground (--no-ground)."
+        )
+    for role in present:
+        if role in foreign:
+            remark(f"{paths[role]} was not written by semsig with {objects}, and is left as it is")
+        elif role not in written:
+            paths[role].unlink()
+            remark(f"{paths[role]}, of earlier objects, was removed")
+    for role, path in written.items():
+        _save(roles[role], path, {GROUND: True})
+    return {**written}
+
+
+def _is_ground(path: Path) -> bool:
+    """Whether a file was written by `save_ground`."""
+    try:
+        return GROUND in parse_json((pq.read_schema(path).metadata or {})[b"PANDAS_ATTRS"])
+    except (pa.ArrowException, OSError, LookupError, TypeError, ValueError):
+        return False
+
+
+def covers_place(path: str | Path, *, crs: CRS, box: Sequence[float]) -> bool:
+    """Whether a GeoParquet file may have features in or near a box, in metres in `crs`.
+
+    Only its metadata is read; one that cannot be read may have some.
+    """
+    try:
+        geo = parse_json((pq.read_schema(path).metadata or {})[b"geo"])
+        column = geo["columns"][geo["primary_column"]]
+        own = CRS.from_user_input(column["crs"])
+        to_box = Transformer.from_crs(own, crs, always_xy=True)
+        west, south, east, north = to_box.transform_bounds(*column["bbox"])
+    except (pa.ArrowException, OSError, LookupError, TypeError, ValueError, ProjError):
+        return True
+    extent = shapely.box(box[0], box[1], box[2], box[3]).buffer(NEAR_M).bounds
+    return bool(
+        west <= extent[2] and east >= extent[0] and south <= extent[3] and north >= extent[1]
+    )
 
 
 def select_role(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) -> gpd.GeoDataFrame:

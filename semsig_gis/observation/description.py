@@ -82,7 +82,7 @@ def read_description(view: AnyView, *, taxonomy: Taxonomy, radius: float = RADIU
     elif isinstance(view, Mapping):
         row, in_words = dict(view), "see" in view
         if all(row.get(name) is None for name in SEEN):
-            near = nearest_name(next(map(str, row), ""), SEEN)
+            near = nearest_name(next((str(key) for key in row if key not in SEEN), ""), SEEN)
             raise InputError(
                 f"the keys {', '.join(map(str, row)) or 'of an empty dict'} do not say what was "
                 f"seen{near}; give {', '.join(SEEN[:-1])} or {SEEN[-1]}."

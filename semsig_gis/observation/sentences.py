@@ -195,7 +195,7 @@ def require_seen(row: Row) -> None:
         hints = (
             f"the key {key!r} is unknown{near}; "
             for key in row
-            if key not in LOOK and (near := nearest_name(str(key), SEEN))
+            if key not in (*LOOK, *SEEN) and (near := nearest_name(str(key), SEEN))
         )
         raise InputError(
             f"{next(hints, '')}it needs types, bearings or both, or detections, see or photos, "

@@ -39,17 +39,18 @@ MOST_COUNT, MOST_ADJECTIVES = 20, 2
 UNITS = frozenset({"metres", "degrees", "hours"})
 # Attributes of `_Part` by kind of item: directions, and what a phrase says of the part.
 DIRECTIONS = {"compass": "points", "turn": "turns", "hours": "hours", "degrees": "degrees"}
-FLAGS = {"none": "absent", "facing": "facing", "within": "within"}
+FLAGS = {"none": "absent", "or": "either", "facing": "facing", "within": "within"}
 SEPARATORS = frozenset({"end", "also"})
 ADJECTIVES_FIRST = frozenset({"en", "de"})
 """Languages in which a word after a thing makes another thing of it, such as "tree stump"."""
 
 _TOKEN = re.compile(
     r"(?P<tag>[\w:]+ ?= ?[\w:*]+)"
-    r"|(?P<number>(?<!\w)[-+]?\d+(?:[.,]\d+)?|\d+(?:[.,]\d+)?)"
+    r"|(?P<number>\(\d+\)|(?<!\w)[-+]?\d+(?:\.\d+|,\d+(?=\s*(?:°|m\b|(?:met|mèt|deg|grad|grau))))?|\d+(?:\.\d+)?)"
     r"|(?P<word>[^\W\d_]+(?:_[^\W\d_]+)*|[°@?])"
-    r"|(?P<end>[,;\n])"
+    r"|(?P<end>[,;!.\n])"
 )
+_UNCLEAR = re.compile(r"[()]|,\d{3}$")
 _DIRECTIONS = (
     "give degrees (at 40, 20 left), a compass point (NE), a time on a clock (3 o'clock), left, "
     "right, ahead or behind"
@@ -250,6 +251,8 @@ def _items(
         if token["end"]:
             item = _Item("end", None, text)
         elif token["number"]:
+            if _UNCLEAR.search(text):
+                raise InputError(f"the number {text} is not clear; write 1000 or 1.5, for example.")
             item = _Item("number", float(text.replace(",", ".")), text)
         elif token["tag"]:
             item = _Item("thing", class_code(text, taxonomy), text)
@@ -328,10 +331,11 @@ class _Part:
     """A part of a sentence about one thing.
 
     `words` are those for things and those without a meaning, each with the number of its run, which
-    ends at a direction. `points`, `turns`, `hours` and `degrees` are directions; `heading` is the
-    direction of sight, and `heading_error` its standard deviation. `joined` is whether the part
-    follows a word such as "and", and `led` whether its direction comes before its thing.
-    `elsewhere` are words for a thing that only other cities have.
+    ends at a direction. `either` is whether it has a word such as "or". `points`, `turns`, `hours`
+    and `degrees` are directions; `heading` is the direction of sight, and `heading_error` its
+    standard deviation. `joined` is whether the part follows a word such as "and", `led` whether its
+    direction comes before its thing, and `split` whether there are directions before and after it,
+    as in "left turn sign ahead". `elsewhere` are words for a thing that only other cities have.
     """
 
     text: str
@@ -339,6 +343,7 @@ class _Part:
     codes: list[int] = field(default_factory=list)
     count: int = 1
     absent: bool = False
+    either: bool = False
     facing: bool = False
     within: bool = False
     heading: float | None = None
@@ -351,6 +356,7 @@ class _Part:
     words: list[tuple[int, _Item]] = field(default_factory=list)
     run: int = 0
     led: bool = False
+    split: bool = False
     elsewhere: str = ""
 
     @property
@@ -407,7 +413,7 @@ class _Part:
         kind, value = item.kind, item.value
         if kind in {"thing", "other"}:
             self.words.append((self.run, item))
-            self.led = self.led or self.directed
+            self.led = self.directed
             self.codes += [value] if kind == "thing" else []
             return
         if kind == "skip":
@@ -418,6 +424,7 @@ class _Part:
             self.heading_error = _point_error(value) if kind == "compass" else 0.0
         elif kind in DIRECTIONS:
             getattr(self, DIRECTIONS[kind]).append(value)
+            self.split = self.led
         elif kind in FLAGS:
             setattr(self, FLAGS[kind], True)
         elif kind == "count":
@@ -454,6 +461,11 @@ class _Part:
             )
         if self.absent and WILDCARD in self.codes:
             raise _absent_unnamed(self.text)
+        if self.absent and self.others:
+            raise InputError(
+                f"{' '.join(self.others)!r} in {self.text!r} is not understood; say 'no' only "
+                "where nothing of that class is in sight."
+            )
         if self.absent and self.says_where:
             raise InputError(
                 f"{self.text!r} says where something is not; say only what is nowhere in sight."
@@ -486,6 +498,11 @@ class _Part:
             case 0, 0, 0, 1 if 1 <= self.hours[0] <= HOURS:
                 offset = self.hours[0] % HOURS * (FULL_TURN / HOURS)
                 place = {"offset": offset, "bearing_error": HOUR_ERROR}
-        if place is None:
-            raise InputError(f"the direction in {self.text!r} is not clear; {_DIRECTIONS}.")
+        directions = len(turns) + len(degrees) + len(points) + len(self.hours)
+        if place is None or (directions > 1 and (self.either or self.split)):
+            raise self.unclear()
         return place
+
+    def unclear(self) -> InputError:
+        """Return the error for directions that do not fit together."""
+        return InputError(f"the direction in {self.text!r} is not clear; {_DIRECTIONS}.")

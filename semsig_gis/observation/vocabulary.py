@@ -18,7 +18,19 @@ if TYPE_CHECKING:
     from semsig_gis.core import Taxonomy
 
 # Kinds of phrases, without and with a value; see `phrases.toml`.
-LISTS = ("skip", "at", "none", "also", "facing", "degrees", "metres", "hours", "clock", "within")
+LISTS = (
+    "skip",
+    "or",
+    "at",
+    "none",
+    "also",
+    "facing",
+    "degrees",
+    "metres",
+    "hours",
+    "clock",
+    "within",
+)
 TABLES = ("number", "turn", "compass", "range")
 SHORT_WORD = 2
 """Words up to this number of letters have no endings."""

@@ -189,22 +189,35 @@ def test_progress_prints_nothing_without_a_terminal(capsys: pytest.CaptureFixtur
         assert not thread.is_alive()
 
 
-def test_long_work_is_estimated_once(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+WORKING = "semsig: working takes about {} minutes more\n"
+
+
+@pytest.mark.parametrize(
+    ("steps", "expected"),
+    [
+        # A slow first part, then one every second.
+        ([(90, 1), (91, 2), (92, 3), (93, 4), (94, 5), (95, 6)], WORKING.format(3)),
+        # Slow parts that become fast, as while code is compiled.
+        ([(9, 1), (18, 2), (22, 3), (24, 60), (26, 120), (28, 190)], ""),
+        ([(2, 100), (4, 150), (6, 200)], ""),
+        ([(2, 20), (4, 20), (60, 20)], ""),
+    ],
+)
+def test_long_work_is_estimated_once_it_is_steady(
+    steps: list[tuple[float, int]],
+    expected: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = 0.0
     monkeypatch.setattr(console.time, "perf_counter", lambda: now)
     with console.progress("working") as advance:
-        for now, completed in ((90.0, 1), (90.5, 2), (92.0, 3), (95.0, 4)):  # noqa: B007 - the clock
+        for now, completed in steps:  # noqa: B007 - the clock
             advance(completed, 200)
-    assert capsys.readouterr().err == "semsig: working takes about 3 minutes more\n"
-    now = 0.0
-    with console.progress("working") as advance:
-        for now, completed in ((2.0, 100), (4.0, 150), (5.0, 200)):  # noqa: B007
-            advance(completed, 200)
+    assert capsys.readouterr().err == expected
     with console.progress("working") as advance:
         console.duration_said.set()  # by a warning
-        for now, completed in ((1.0, 1), (9.0, 2)):  # noqa: B007
+        for now, completed in steps:  # noqa: B007
             advance(completed, 200)
     assert capsys.readouterr().err == ""
 

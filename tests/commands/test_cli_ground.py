@@ -12,6 +12,7 @@ from osm_xml import node, way, write_osm
 from sentences import sentence
 
 from semsig_gis.database import open_city, open_store
+from semsig_gis.objects import read_surroundings, save_surroundings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -86,6 +87,49 @@ def test_ground_of_an_earlier_load_is_not_used(town: Path, run_ok: RunOk) -> Non
     city = open_city("city.parquet")
     assert (city.database.viewpoints.mode, city.database.occlusion) == ("all", None)
     assert (city.store.footprints, len(city.store.streets)) == (None, 1)
+
+
+def test_files_of_a_user_are_not_lost(town: Path, run: Run, run_ok: RunOk) -> None:
+    own = gpd.GeoDataFrame(geometry=[shapely.box(LON, LAT, LON + 0.001, LAT + 0.001)], crs=4326)
+    save_surroundings(own, town / GROUND[0])
+    (town / GROUND[1]).write_text("notes", "utf-8")
+    before = [(town / name).read_bytes() for name in GROUND]
+    sentence(run(LOAD), *GROUND, "would be replaced", "--no-ground")
+    assert not (town / "town.parquet").exists()
+    code, _, err = run(f"{LOAD} --no-ground")
+    assert code == 0
+    assert all(f"{name} was not written by semsig" in err for name in GROUND)
+    assert [(town / name).read_bytes() for name in GROUND] == before
+    (town / GROUND[1]).unlink()
+    run_ok("build town.parquet --out city.parquet --no-ground")
+    run_ok("export city.parquet --out city.gpkg --objects town.parquet")
+    code, _, err = run("import city.gpkg --out new.parquet --objects town.parquet")
+    assert (code, f"{GROUND[0]} was not written by semsig" in err) == (0, True)
+    assert (town / GROUND[0]).read_bytes() == before[0]
+
+
+def test_ground_that_was_changed_by_its_user_is_kept(town: Path, run: Run, run_ok: RunOk) -> None:
+    run_ok(LOAD)
+    code, _, err = run(f"{LOAD} --no-ground")
+    assert (code, err.count("was removed")) == (0, 2)
+    run_ok(LOAD)
+    table = read_surroundings(town / GROUND[0], role="buildings", crs=4326)
+    save_surroundings(table, town / GROUND[0])
+    sentence(run(LOAD), GROUND[0], "would be replaced")
+
+
+@pytest.mark.parametrize("out", ["city.parquet", "tiles --tile 100"])
+def test_ground_of_another_city_is_not_used(town: Path, run: Run, run_ok: RunOk, out: str) -> None:
+    run_ok(LOAD)
+    there = gpd.GeoDataFrame(geometry=[shapely.box(-0.1, 51.5, -0.09, 51.51)], crs=4326)
+    save_surroundings(there, town / GROUND[0])
+    code, _, err = run(f"build town.parquet --out {out}")
+    assert (code, f"the buildings of {GROUND[0]} are not where" in err) == (0, True)
+    assert "hide what is behind" not in err
+    store = open_store(out.split(maxsplit=1)[0])
+    assert (store.footprints, len(store.streets)) == (None, 1)
+    code, _, err = run(f"build town.parquet --out {out} --buildings {GROUND[0]}")
+    assert f"the buildings of {GROUND[0]} are not where the street objects are\n" in err
 
 
 @pytest.mark.parametrize(("name", "options"), [("city.parquet", ""), ("city", "--tile 100")])
