@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -161,9 +162,16 @@ class Build:
         from semsig_gis.objects import ground_file, open_objects, read_area
         from semsig_gis.storage import EMPTY_BOX, bounds_by_group
 
+        beside = {role: ground_file(self.objects, role) for role in ROLES}
+        for role, path in beside.items():
+            if os.path.realpath(path) == os.path.realpath(self.out):
+                raise InputError(
+                    f"{self.out} is where the {role} of {self.objects} are, so no database can be "
+                    "written there; give another name."
+                )
         defaults = {
-            role: ground_file(self.objects, role)
-            for role in ROLES
+            role: path
+            for role, path in beside.items()
             if self.ground and getattr(self, role) is None
         }
         defaults = {role: path for role, path in defaults.items() if path.is_file()}

@@ -118,6 +118,17 @@ def test_ground_that_was_changed_by_its_user_is_kept(town: Path, run: Run, run_o
     sentence(run(LOAD), GROUND[0], "would be replaced")
 
 
+@pytest.mark.parametrize("options", ["", " --no-ground", " --tile 100"])
+@pytest.mark.parametrize("name", GROUND)
+def test_build_does_not_replace_the_ground(
+    town: Path, run: Run, run_ok: RunOk, name: str, options: str
+) -> None:
+    run_ok(LOAD)
+    before = (town / name).read_bytes()
+    sentence(run(f"build town.parquet --out {name}{options}"), name, "another name")
+    assert (town / name).read_bytes() == before
+
+
 @pytest.mark.parametrize("out", ["city.parquet", "tiles --tile 100"])
 def test_ground_of_another_city_is_not_used(town: Path, run: Run, run_ok: RunOk, out: str) -> None:
     run_ok(LOAD)
