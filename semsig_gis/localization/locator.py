@@ -245,12 +245,14 @@ def method_index(database: SignatureDatabase, method: LikelihoodMethod) -> Likel
     from semsig_gis.localization.likelihood.index import build_index  # noqa: PLC0415 - above
 
     noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
-    indexes: list[LikelihoodIndex] = database.memo
-    for index in indexes:
-        if index.noise == noise:
+    # The noise of an index may differ from the one that was asked for, so both are kept.
+    indexes: list[tuple[Noise, LikelihoodIndex]] = database.memo
+    for asked, index in indexes:
+        if asked == noise:
             return index
-    indexes[:] = [*indexes[1 - KEPT_INDEXES :], build_index(database, noise)]
-    return indexes[-1]
+    index = build_index(database, noise)
+    indexes[:] = [*indexes[1 - KEPT_INDEXES :], (noise, index)]
+    return index
 
 
 @overload

@@ -15,6 +15,7 @@ from semsig_gis.core import DEFAULT_METHOD, PAPER_METHOD, InputError, UnknownNam
 from semsig_gis.database import open_city
 from semsig_gis.evaluation import evaluate
 from semsig_gis.localization import (
+    NOISES,
     LikelihoodMethod,
     Method,
     Requirement,
@@ -132,6 +133,14 @@ def test_database_keeps_the_last_indexes() -> None:
         method_index(database, parse_method(f"likelihood:{name}"))
     assert method_index(database, methods[2]) is indexes[2]
     assert method_index(database, methods[0]) is not indexes[0]
+
+
+@pytest.mark.parametrize("name", sorted(NOISES))
+def test_index_of_every_noise_is_used_again(name: str) -> None:
+    database = random_town().database
+    method = parse_method(f"likelihood:{name}")
+    assert method_index(database, method) is method_index(database, method)
+    assert len(database.memo) == 1
 
 
 def test_many_questions_are_answered_in_order() -> None:
