@@ -97,9 +97,9 @@ def screenshot(browser: Chrome) -> Image.Image:
 
 def element(browser: Chrome, selector: str) -> Image.Image:
     """Return a picture of an element."""
-    found = browser.find_element("css selector", selector)
-    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", found)
-    return Image.open(io.BytesIO(found.screenshot_as_png)).convert("RGB")
+    node = browser.find_element("css selector", selector)
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", node)
+    return Image.open(io.BytesIO(node.screenshot_as_png)).convert("RGB")
 
 
 def below(*pictures: Image.Image) -> Image.Image:

@@ -231,10 +231,10 @@ class Build:
         """Return the files that were found and are where the street objects are; note others."""
         from semsig_gis.objects import covers_place
 
-        given = {role: path for role in ROLES if (path := getattr(self, role)) is not None}
+        own = {role: path for role in ROLES if (path := getattr(self, role)) is not None}
         elsewhere = {
             role: path
-            for role, path in {**defaults, **given}.items()
+            for role, path in {**defaults, **own}.items()
             if not covers_place(path, crs=crs, box=box)
         }
         for role, path in elsewhere.items():

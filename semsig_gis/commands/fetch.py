@@ -120,8 +120,8 @@ class Fetch(LoadOptions):
                 layers = fetch(specs)
             except (CatalogError, SourceError) as error:
                 ground = [spec for spec in specs if spec.role != "objects"]
-                asked = self.buildings is not None or self.streets is not None
-                if asked or not any(f"layer {spec.name!r}" in str(error) for spec in ground):
+                explicit = self.buildings is not None or self.streets is not None
+                if explicit or not any(f"layer {spec.name!r}" in str(error) for spec in ground):
                     raise
                 reporter.remark(f"without buildings and streets: {error}")
                 layers = fetch([spec for spec in specs if spec not in ground])

@@ -374,10 +374,12 @@ def localize_many(
 
     Parameters
     ----------
-    database, method, requirement, top, north, **options
+    database : path, SignatureDatabase, PartitionedDatabase or City
         As in `localize`.
     queries : iterable
         What was seen, each as in `localize`. One that cannot be read raises its error in its turn.
+    method, requirement, top, north, **options : optional
+        As in `localize`.
 
     Returns
     -------

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -210,7 +211,7 @@ def test_long_work_is_estimated_once_it_is_steady(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = 0.0
-    monkeypatch.setattr(console.time, "perf_counter", lambda: now)
+    monkeypatch.setattr(time, "perf_counter", lambda: now)
     with console.progress("working") as advance:
         for now, completed in steps:  # noqa: B007 - the clock
             advance(completed, 200)

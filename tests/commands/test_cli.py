@@ -416,10 +416,10 @@ def test_likelihood_is_evaluated_and_drawn(run_ok: RunOk) -> None:
 
 @pytest.mark.usefixtures("city")
 def test_sentence_is_repeated_as_it_was_understood(run_ok: RunOk) -> None:
-    said = "a green lamp on the left, 2 lamps ahead, lamp 20 right, no crossing"
-    out = " ".join(run_ok("localize city.parquet", said).split())
-    seen = "street light ahead ± 26°, street light ahead ± 26°, street light 20° right, "
-    assert f"Seen: {seen}street light 90° left ± 26°; north unknown." in out
+    words = "a green lamp on the left, 2 lamps ahead, lamp 20 right, no crossing"
+    out = " ".join(run_ok("localize city.parquet", words).split())
+    classes = "street light ahead ± 26°, street light ahead ± 26°, street light 20° right, "
+    assert f"Seen: {classes}street light 90° left ± 26°; north unknown." in out
     assert "Not there: crossing" in out
     assert "Note: 'green' was not used." in out
     out = " ".join(

@@ -150,8 +150,8 @@ def test_tiles_that_pages_from_disk_do_not_get_are_named(run: Run) -> None:
 
 
 def test_map_of_an_answer_compares_without_being_asked(run_ok: RunOk) -> None:
-    for seen, compared in (("--types DD --bearings 10,80", True), ("--types DD", False)):
-        text = run_ok(f"localize city.parquet {seen} --map query.html --json")
+    for view, compared in (("--types DD --bearings 10,80", True), ("--types DD", False)):
+        text = run_ok(f"localize city.parquet {view} --map query.html --json")
         assert "explanation" not in text
         page = Path("query.html").read_text(encoding="utf-8")
         assert '"answerObjects"' in page

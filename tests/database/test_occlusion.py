@@ -205,7 +205,7 @@ def test_buildings_of_a_store_hide_what_they_hide_together(town: World) -> None:
     rng = np.random.default_rng(5)
     corners = rng.uniform(0, 600, (150, 2))
     sides = rng.uniform(5, 30, (150, 2))
-    houses = shapely.box(*corners.T, *(corners + sides).T)
+    houses = np.asarray(shapely.box(*corners.T, *(corners + sides).T))
     flat = shapely.Polygon([(0, 0), (9, 0), (4, 0)])
     table = gpd.GeoDataFrame(geometry=[*houses, flat], crs=town.street_objects.crs)
     store = ObjectStore.of(town.street_objects, footprints=table)

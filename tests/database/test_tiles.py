@@ -230,8 +230,8 @@ def test_streets_that_no_viewpoint_needs_are_kept_for_maps(
     save_surroundings(STREETS, streets)
     tile_plan = plan(objects_file, streets=streets)
     assert tile_plan.streets is None
-    kept = tmp_path / "city.partial" / "_inputs" / "streets.parquet"
-    assert kept.read_bytes() == streets.read_bytes()
+    copy = tmp_path / "city.partial" / "_inputs" / "streets.parquet"
+    assert copy.read_bytes() == streets.read_bytes()
 
 
 def test_other_files_are_copied_once(objects_file: Path, town: World, tmp_path: Path) -> None:

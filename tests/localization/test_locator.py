@@ -81,8 +81,8 @@ def test_every_form_of_a_view_gives_the_same_answer(tmp_path: Path) -> None:
     # Rows are those of a detector.
     generic = localize(path, parsed).to_dict()
     assert generic["noise"] == "generic"
-    for view in (DETECTIONS, {"detections": DETECTIONS}):
-        assert localize(path, view).to_dict() == generic
+    for rows in (DETECTIONS, {"detections": DETECTIONS}):
+        assert localize(path, rows).to_dict() == generic
 
 
 def test_class_names_and_ranges_need_no_bearings() -> None:
@@ -116,6 +116,8 @@ def test_answer_says_where_and_why(tmp_path: Path) -> None:
     table = answer.explain()
     assert list(table) == ["you said", "is there", "verdict", "chance"]
     assert (table["verdict"][: len(QUERY)] == "is there").all()
+    assert QUERY.codes is not None
+    assert QUERY.bearings is not None
     first = CITY.taxonomy.by_code(int(QUERY.codes[0])).title.lower()
     assert table["you said"][0] == f"{first} at {QUERY.bearings[0]:.0f}°"
     assert table["is there"][0].startswith(first)
@@ -126,11 +128,13 @@ def test_answer_says_where_and_why(tmp_path: Path) -> None:
 
 def test_database_keeps_the_last_indexes() -> None:
     database = random_town().database
-    methods = [parse_method(f"likelihood:{name}") for name in ("generic", "light", "medium")]
+    methods = [
+        LikelihoodMethod.parse(f"likelihood:{name}") for name in ("generic", "light", "medium")
+    ]
     indexes = [method_index(database, method) for method in methods]
     assert [method_index(database, method) for method in methods] == indexes
     for name in ("strong", "by-hand", "photo"):
-        method_index(database, parse_method(f"likelihood:{name}"))
+        method_index(database, LikelihoodMethod.parse(f"likelihood:{name}"))
     assert method_index(database, methods[2]) is indexes[2]
     assert method_index(database, methods[0]) is not indexes[0]
 
@@ -144,7 +148,7 @@ def test_index_of_every_noise_is_used_again(name: str) -> None:
 
 
 def test_many_questions_are_answered_in_order() -> None:
-    views = [SENTENCE, PAIRS[:2], QUERY]
+    views: list[Any] = [SENTENCE, PAIRS[:2], QUERY]
     answers = localize_many(CITY, iter(views), top=3)
     assert [answer.to_dict() for answer in answers] == [
         localize(CITY, view, top=3).to_dict() for view in views

@@ -133,9 +133,14 @@ def test_coordinate_systems_are_given_as_codes_text_or_values(tmp_path: Path) ->
     for objects in results:
         assert objects.crs.to_epsg() == 32632
         assert (objects.xy == results[0].xy).all()
-    for options in ({"metric_crs": 4326}, {"metric_crs": 999_999}, {"crs": 999_999}):
+    wrong: list[dict[str, Any]] = [
+        {"crs": 4326, "metric_crs": 4326},
+        {"crs": 4326, "metric_crs": 999_999},
+        {"crs": 999_999},
+    ]
+    for options in wrong:
         with refused(CrsError, "EPSG:"):
-            load(tmp_path, catalog=catalog, **{"crs": 4326, **options})
+            load(tmp_path, catalog=catalog, **options)
 
 
 def test_other_layers_of_an_extract_are_counted(tmp_path: Path) -> None:

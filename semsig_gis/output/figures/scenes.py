@@ -304,8 +304,8 @@ class _Column:
     def of(cls, scene: Scene) -> _Column:
         signs = class_signs(scene.taxonomy)
         titles = textwrap.wrap(label(scene.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
-        seen = label(_seen(scene), TYPE_LETTERS * TYPE_LINES)
-        lines = textwrap.wrap(f"sees {seen}", TYPE_LETTERS)
+        classes = label(_seen(scene), TYPE_LETTERS * TYPE_LINES)
+        lines = textwrap.wrap(f"sees {classes}", TYPE_LETTERS)
         if scene.asked:
             lines.append("around the circle: the query")
         place = f"{scene.lat:.6f}°, {scene.lon:.6f}°"

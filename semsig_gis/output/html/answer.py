@@ -145,12 +145,12 @@ def location_map(
     """
     database, drawing = location.posterior.database, answer_drawing(location)
     page = start_map(map_, tiles, title="Where it was seen")
-    given = location.answer.given
-    _colour_chances(page, location.posterior, radius=location.rule.radius, near=given)
+    sure = location.answer.given
+    _colour_chances(page, location.posterior, radius=location.rule.radius, near=sure)
     cells = location.columns["cell"].tolist()
     looks = [(CANDIDATE, 8, f"Rank {rank:,}", str(rank)) for rank in range(1, len(cells) + 1)]
     # Around an answer they would hide its objects.
-    _add_candidates(page, location, database, cells, looks, show=not given)
+    _add_candidates(page, location, database, cells, looks, show=not sure)
     signs = panel_signs(database)
     explained = max(1, len(location.explanations))
     for rank, candidate in enumerate(drawing["candidates"][:explained], start=1):
@@ -161,7 +161,7 @@ def location_map(
             parts.append(["lines", [[SECTOR, sectors]]])
         name = f"Objects from rank {rank}"
         add_layer(page, name, "drawings", parts, group="answer", show=rank == 1)
-    mark = ANSWERS["given" if given else "withheld"]
+    mark = ANSWERS["given" if sure else "withheld"]
     outline = {"color": mark.colour, "weight": 3, "opacity": 0.9}
     place = [
         ["lines", [[outline, [drawing["estimate"]["ellipse"]]]]],
@@ -210,13 +210,13 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
     codes = [] if query.codes is None else query.codes.tolist()
     rest = [code for number, code in enumerate(codes) if number not in compared]
     words, database = location.taxonomy.words, location.posterior.database
-    seen = database.codes[slice(*database.offsets[candidate["cell"] :][:2])]
-    there = "none on this map" if rays else words(seen)
+    visible = database.codes[slice(*database.offsets[candidate["cell"] :][:2])]
+    there = "none on this map" if rays else words(visible)
     more = [[words(rest), there]] if rest else []
     lat, lon = candidate["rays"][0]["from"] if candidate["rays"] else candidate["place"]
     best = exact_latlon(location.xy, location.crs)[0] if rank == 1 else [lat, lon]
-    given = location.answer.given
-    title = ("Found" if given else "Cannot tell: the best guess") if rank == 1 else f"Rank {rank}"
+    sure = location.answer.given
+    title = ("Found" if sure else "Cannot tell: the best guess") if rank == 1 else f"Rank {rank}"
     chance = location.answer.mass if rank == 1 else candidate["chance"]
     xy = location.xy if rank == 1 else (candidate["x"], candidate["y"])
     where = "" if location.city is None else location.city.place_name(*xy)

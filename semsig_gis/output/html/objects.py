@@ -146,13 +146,13 @@ def packed_ground(
 
 def _joined(streets: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     """Return streets with the lines of each name joined, so that there is room for the name."""
-    named = (streets[NAME].notna() & (streets[NAME] != "")).to_numpy()
+    has_name = (streets[NAME].notna() & (streets[NAME] != "")).to_numpy()
     lines = (
-        streets.geometry[named]
-        .groupby(streets[NAME][named])
+        streets.geometry[has_name]
+        .groupby(streets[NAME][has_name])
         .agg(lambda group: shapely.line_merge(shapely.multilinestrings(shapely.get_parts(group))))
     )
-    others = streets.geometry[~named]
+    others = streets.geometry[~has_name]
     return gpd.GeoDataFrame(
         {NAME: [*lines.index, *[None] * len(others)]},
         geometry=[*lines, *others],

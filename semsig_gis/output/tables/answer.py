@@ -64,24 +64,27 @@ def answer_tables(
         yield f"{title}: {address}"
 
 
-def cities_summary(locations: Mapping[str, Location], elsewhere: float) -> Iterator[str]:
-    """Yield the chance of each of some cities, the likeliest place, and the query."""
+def cities_summary(locations: Mapping[str, Location], elsewhere: float) -> list[str]:
+    """Return the chance of each of some cities, the likeliest place, and the query."""
     name, best = likeliest_city(locations)
-    for area, location in locations.items():
-        yield f"{area}: chance {percent(1.0 - location.elsewhere)}."
-    yield f"elsewhere: chance {percent(elsewhere)}."
-    yield f"In {name}:"
-    yield from (
+    chances = (
+        f"{area}: chance {percent(1.0 - location.elsewhere)}."
+        for area, location in locations.items()
+    )
+    return [
+        *chances,
+        f"elsewhere: chance {percent(elsewhere)}.",
+        f"In {name}:",
         *place_sentences(best),
         *query_sentences(best),
         *note_sentences(*locations.values()),
-    )
+    ]
 
 
 def cities_tables(
     locations: Mapping[str, Location], elsewhere: float, *, top: int, symbols: bool = False
-) -> Iterator[Table]:
-    """Yield the table of the best candidates of some cities."""
+) -> list[Table]:
+    """Return the table of the best candidates of some cities."""
     _, best = likeliest_city(locations)
     rows = city_candidates(locations, top)
     cells = sum(location.cells for location in locations.values())
@@ -93,13 +96,14 @@ def cities_tables(
         )
         for row in rows
     )
-    yield Table(
-        f"{len(rows)} best places in {cells:,} cells of {len(locations)} cities "
-        f"(noise: {best.noise})",
+    title = f"{len(rows)} best places in {cells:,} cells of {len(locations)} cities"
+    table = Table(
+        f"{title} (noise: {best.noise})",
         ("rank", "city", "cell", "lat", "lon", "chance", SEEN_THERE),
         (*places, ("", "elsewhere", "", "", "", percent(elsewhere), "")),
         minor=MINOR,
     )
+    return [table]
 
 
 def likeliest_city(locations: Mapping[str, Location]) -> tuple[str, Location]:
@@ -146,13 +150,13 @@ def suggest_summary(questions: Sequence[ClassQuestion], location: Location) -> I
     yield from (*query_sentences(location), *note_sentences(location))
 
 
-def suggest_tables(questions: Iterable[ClassQuestion]) -> Iterator[Table]:
-    """Yield a table of all questions, most useful first."""
+def suggest_tables(questions: Iterable[ClassQuestion]) -> list[Table]:
+    """Return a table of all questions, most useful first."""
     rows = (
         (question.text, percent(question.chance), f"{round(question.gain, 4):.3f}")
         for question in questions
     )
-    yield Table("What to look for next", ("question", "yes", "bits"), tuple(rows))
+    return [Table("What to look for next", ("question", "yes", "bits"), tuple(rows))]
 
 
 def place_sentences(location: Location) -> list[str]:

@@ -10,7 +10,7 @@ from semsig_gis.evaluation import published as paris
 from semsig_gis.output.tables.tables import distortion_rows, note_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Mapping
 
     from semsig_gis.database import Companion, SignatureDatabase
 
@@ -42,12 +42,12 @@ def database_tables(
     return (*(table(facts) for table in tables), *note_tables(facts["notes"]))
 
 
-def database_sentences(facts: Mapping[str, Any], *, symbols: bool = False) -> Iterator[str]:
-    """Yield the size of a database, how distinct its cells are, and the classes that are seen.
+def database_sentences(facts: Mapping[str, Any], *, symbols: bool = False) -> list[str]:
+    """Return the size of a database, how distinct its cells are, and the classes that are seen.
 
     With `symbols`, a class has its letter as well.
     """
-    yield (
+    size = (
         f"{facts['signatures']:,} cells of {facts['step_m']:g} m see {facts['mean_length']:.1f} "
         f"street objects on average, up to {facts['radius_m']:g} m away; "
         f"{percent(facts['groups']['type']['unique'], 0)} of them see classes in an order that no "
@@ -55,7 +55,7 @@ def database_sentences(facts: Mapping[str, Any], *, symbols: bool = False) -> It
     )
     items = sorted(facts["occurrences"], key=lambda item: -item["number"])
     names = (class_label(item, symbols=symbols) for item in items if item["number"])
-    yield f"Seen: {', '.join(names)}."
+    return [size, f"Seen: {', '.join(names)}."]
 
 
 def companion_table(title: str, companions: Iterable[Companion]) -> Table:

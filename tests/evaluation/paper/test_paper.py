@@ -278,7 +278,7 @@ def test_report_has_the_figures_of_the_evaluations(
 def test_section_on_unambiguous_queries(report: Report, reproduction: Reproduction) -> None:
     queries = reproduction.experiments["levels"]["light/stages-5-top1"].queries
     unambiguous = queries[queries["type_group"] == 1]
-    section = numbers(report, "alone")
+    section = numbers(report, "unambiguous")
     assert section["light", "P(error ≤ 50 m)"].ours == pytest.approx(unambiguous["p50"].mean())
     assert section["queries", "share in a group of one"].ours == pytest.approx(
         len(unambiguous) / QUERIES

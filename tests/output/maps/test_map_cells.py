@@ -250,8 +250,8 @@ def test_drift_map_compares_cells(page: MapPage) -> None:
         assert page.classes("Now") == (titles(OLD, then) or ["nothing"])
     parts = facts["Difference"].split(", ")
     difference = {tuple(part[1:].split("\u00a0", 1)) for part in parts}
-    gone = Counter(title.lower() for title in titles(OLD, OLD.types(vanished)))
-    assert difference == {(str(count), title) for title, count in gone.items()}
+    losses = Counter(title.lower() for title in titles(OLD, OLD.types(vanished)))
+    assert difference == {(str(count), title) for title, count in losses.items()}
     legend = page.one(LEGEND).text
     for rows, title in (
         (CELLS.same, "see what they saw"),

@@ -94,14 +94,14 @@ def test_legend_and_list_of_layers_count_what_is_selected(filters_page: MapPage)
     assert numbers() == [str(total) for total in totals]
     assert not filters_page.one(".semsig-selected").is_displayed()
     slide(filters_page, "Objects seen, least", 6)
-    seen = QUERIES["length"].to_numpy() >= 6
+    enough = QUERIES["length"].to_numpy() >= 6
     counts = [f"{count} of {total}" for count, total in
-              zip(np.bincount(FAILED[seen], minlength=2), totals, strict=True)]  # fmt: skip
+              zip(np.bincount(FAILED[enough], minlength=2), totals, strict=True)]  # fmt: skip
     assert numbers() == counts
     labels = [label for label in filters_page.layers() if "queries (" in label]
     assert labels[:2] == [f"Successful queries ({counts[0]})", f"Failed queries ({counts[1]})"]
     text = filters_page.text(".semsig-selected")
-    assert f"Selected: {seen.sum()} of {len(seen)} queries" in text
+    assert f"Selected: {enough.sum()} of {len(enough)} queries" in text
     assert "objects seen: 6 to" in text
     filters_page.switch("Failed")
     assert "not failed" in filters_page.text(".semsig-selected")

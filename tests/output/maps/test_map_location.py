@@ -113,14 +113,14 @@ def test_first_view_shows_what_was_said_next_to_what_is_there(page: MapPage) -> 
     shown = Counter(tuple(filter(None, re.split(r"[\t\n]+", text))) for text in texts)
     expected: Counter[tuple[str, ...]] = Counter()
     for row in rows:
-        said, there = ["not said"], ["not there"]
+        query_part, map_part = ["not said"], ["not there"]
         if row["query_class"]:
-            said = [title_of[row["query_class"]], f"{row['query_bearing']:.0f}°"]
+            query_part = [title_of[row["query_class"]], f"{row['query_bearing']:.0f}°"]
         if row["object_class"]:
-            there = [title_of[row["object_class"]]]
-            there.append(f"{row['object_bearing']:.0f}°, {row['distance']:.0f} m")
+            map_part = [title_of[row["object_class"]]]
+            map_part.append(f"{row['object_bearing']:.0f}°, {row['distance']:.0f} m")
         more = ["of another class"] if row["verdict"] == "misnamed" else []
-        expected[*said, *there, *more] += 1
+        expected[*query_part, *map_part, *more] += 1
     assert shown == expected
     assert {row["verdict"] for row in rows} >= {"matched", "misnamed", "false"}
     # All signs are in view, next to the panel.

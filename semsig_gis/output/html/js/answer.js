@@ -47,7 +47,7 @@ semsig.answerObjects = (about, signs) => {
     }
     ctx.restore();
   };
-  const paint = (onMap) => (ctx, min, max) => {
+  const paint = (onMap) => (ctx) => {
     const dark = semsig.isDark(onMap);
     const size = sizes.find(([below]) => onMap.getZoom() < below)[1];
     const at = (latlng) => onMap.latLngToLayerPoint(latlng);

@@ -168,7 +168,7 @@ semsig.addControls = (map, layers, area, {credits, first, links, at}) => {
   semsig.folding(map, layers);
   semsig.fitView(map);
   const state = semsig.state.read();
-  if (first && !state.has("told")) {
+  if (first && !state.has(semsig.selectionPart)) {
     const [kind, key] = first.split(":");
     for (const legend of map.getContainer().querySelectorAll(".semsig-legend")) legend.open = false;
     layers.options.collapsed = true;

@@ -277,7 +277,7 @@ semsig.filters = async (map, key) => {
           number(failed)} failed (${limits.join("; ")}). Shares and colours are of all queries.`;
       }
     }
-    outcomes.forEach((_, at) => semsig.countLayer(layers[at], shares[at]));
+    for (const at of outcomes.keys()) semsig.countLayer(layers[at], shares[at]);
   };
   const changed = () => {
     show();

@@ -40,14 +40,16 @@ semsig.remember = (map, key, read, write) => {
 };
 // Functions that open the panel for a key, by the kind of the key (the part before ":").
 semsig.openers = {};
-// Remembers the object in the panel. The part is called "told" so that older links still work.
+// The part for the object in the panel. It has this name so that older links still work.
+semsig.selectionPart = "told";
+// Remembers the object in the panel.
 semsig.rememberSelection = (map) => {
   let selection = null;
   map.on("semsig-panel", ({key}) => {
     selection = key;
     map.fire("semsig-state");
   });
-  semsig.remember(map, "told", () => selection, (text) => {
+  semsig.remember(map, semsig.selectionPart, () => selection, (text) => {
     const [kind, ...rest] = text.split(":");
     if (text !== selection && Object.hasOwn(semsig.openers, kind)) {
       semsig.openers[kind](map, rest.join(":"));

@@ -352,12 +352,12 @@ def _unambiguous_section(results: Reproduction) -> Section:
             share = share_of(case, figure, is_unambiguous(case))
             numbers.append(share.number(name, COLUMNS[figure]))
     return _section(
-        "alone",
+        "unambiguous",
         "Unambiguous queries",
         "The same for queries from cells with types that no other cell has, before the "
         "distortion. The paper shows these only as plots.",
         numbers=numbers,
-        plots=_plots("alone", "unambiguous queries", cases, {}, unambiguous=True),
+        plots=_plots("unambiguous", "unambiguous queries", cases, {}, unambiguous=True),
     )
 
 
