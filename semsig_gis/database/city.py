@@ -33,6 +33,7 @@ from semsig_gis.database.store import (
     built_digest,
     current_store,
     file_state,
+    ground_licenses,
     names_in,
     open_store,
 )
@@ -116,8 +117,21 @@ class City(Displayed):
 
     @property
     def licenses(self) -> tuple[str, ...]:
-        """Attribution and licence of each source."""
-        return self.database.licenses
+        """Attribution and licence of each source, also of what only names places and is on maps."""
+        return tuple(dict.fromkeys((*self.database.licenses, *self.ground_licenses)))
+
+    @cached_property
+    def ground_licenses(self) -> tuple[str, ...]:
+        """Attribution and licence of the buildings and streets; empty without a store.
+
+        Of a database in parts, no building or street is read.
+        """
+        try:
+            if self._in_parts and "store" not in vars(self):
+                return ground_licenses(self.path)
+            return self.store.ground_licenses
+        except DatabaseError:
+            return ()
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -148,6 +148,11 @@ class ObjectStore(Displayed):
         tables = {"buildings": self.footprints, "streets": self.streets}
         return {name: table for name, table in tables.items() if table is not None}
 
+    @property
+    def ground_licenses(self) -> tuple[str, ...]:
+        """Attribution and licence of the buildings and streets."""
+        return licenses_of(self.footprints, self.streets)
+
     def ground_around(self, xy: NDArray[np.float64]) -> dict[str, Any]:
         """Return the arguments of `ground_map` around places, (n, 2); empty without any ground."""
         low, high = xy.min(axis=0) - GROUND_M, xy.max(axis=0) + GROUND_M
@@ -400,6 +405,13 @@ def _read_inputs(folder: Path) -> ObjectStore:
     objects = open_objects(files.pop("objects"))
     houses, lines = _read_ground(files, objects.crs)
     return ObjectStore.of(objects, footprints=houses, streets=lines)
+
+
+def ground_licenses(folder: Path) -> tuple[str, ...]:
+    """Return the attribution and licence of the buildings and streets of a database in parts."""
+    files = stored_inputs(folder)
+    crs = open_objects(files.pop("objects"), box=EMPTY_BOX).crs
+    return licenses_of(*_read_ground(files, crs, EMPTY_BOX))
 
 
 def names_in(folder: Path, square: tuple[int, int]) -> PlaceNames:

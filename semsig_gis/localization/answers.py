@@ -99,7 +99,7 @@ class Answer(Displayed):
     (symbols), ``length`` (objects) and columns of the method; `candidates` is a table of them.
     `cells` is the number of cells searched. `notes` are sentences on parts of the query that were
     not used or look wrong. The bearings of `query` are measured from `north`. `city`, if known,
-    names places by their streets and is drawn below the answer.
+    names places by their streets and is drawn below the answer; `licenses` include its own.
     """
 
     query: Signature
@@ -225,6 +225,14 @@ class Ranking:
     chances: NDArray[np.float64] | None = None
     region: NDArray[np.int64] | None = None
     seconds: float
+
+
+def answer_licenses(
+    database: SignatureDatabase, city: City | ObjectStore | None
+) -> tuple[str, ...]:
+    """Return the licences of a database and of the buildings and streets that name its places."""
+    ground = () if city is None else city.ground_licenses
+    return tuple(dict.fromkeys((*database.licenses, *ground)))
 
 
 def check_top(top: int) -> None:

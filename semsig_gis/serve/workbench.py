@@ -186,10 +186,10 @@ class Workbench:
             "reach": database.reach,
             "method": "likelihood",
             "noise": list(self.noises),
-            "licences": list(map(str, database.licenses)),
+            "licences": list(self.city.licenses),
             # Without the layers, which the page lists apart.
             "credit": ", ".join(
-                dict.fromkeys(line.partition(": ")[0] for line in database.licenses)
+                dict.fromkeys(line.partition(": ")[0] for line in self.city.licenses)
             ),
             "bounds": corners_of(database).tolist(),
             "image": {"url": data_url(image), "bounds": bounds},

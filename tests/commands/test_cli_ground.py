@@ -11,6 +11,7 @@ import shapely
 from osm_xml import node, way, write_osm
 from sentences import sentence
 
+from semsig_gis.core import LICENSES
 from semsig_gis.database import open_city, open_store
 from semsig_gis.objects import read_surroundings, save_surroundings
 
@@ -168,6 +169,25 @@ def test_answers_name_their_place(
         assert f"{place['lat']:.4f}" in place["links"]["OpenStreetMap"]
     run_ok("build town.parquet --out city.parquet --no-ground")
     assert json.loads(run_ok(f"localize city.parquet {QUERY}"))["place"]["name"] == ""
+
+
+@pytest.mark.parametrize(("name", "options"), [("city.parquet", ""), ("city", "--tile 100")])
+@pytest.mark.parametrize("method", ["likelihood", "edit+edit"])
+def test_sources_of_names_are_credited(
+    town: Path, run_ok: RunOk, name: str, options: str, method: str
+) -> None:
+    run_ok(LOAD)
+    streets = gpd.read_parquet(town / GROUND[1])
+    streets.attrs[LICENSES] = ["Streets of the town: CC BY"]
+    save_surroundings(streets, town / "lanes.parquet")
+    run_ok(f"build town.parquet --out {name} {options} --streets lanes.parquet --viewpoints all")
+    record = json.loads(run_ok(f"localize {name} {QUERY} --method {method}"))
+    assert record["licenses"][-1] == "Streets of the town: CC BY"
+    assert len(record["licenses"]) == len(set(record["licenses"])) > 1
+    for suffix in ("kml", "geojson"):
+        run_ok(f"localize {name} {QUERY} --method {method} --out answer.{suffix}")
+        assert "Streets of the town: CC BY" in (town / f"answer.{suffix}").read_text("utf-8")
+    assert "Streets of the town: CC BY" in open_city(name).licenses
 
 
 def test_streets_are_kept_for_every_choice_of_viewpoints(town: Path, run_ok: RunOk) -> None:

@@ -22,6 +22,7 @@ from semsig_gis.localization.answers import (
     BestPlaceRecord,  # noqa: TC001 - pydantic reads it
     CandidateRecord,
     Ranking,
+    answer_licenses,
     candidate_columns,
     check_top,
     query_notes,
@@ -194,7 +195,7 @@ class DistanceLocator:
             tied_beyond=tied_beyond,
             crs=part.crs,
             taxonomy=part.taxonomy,
-            licenses=part.licenses,
+            licenses=answer_licenses(part, self.city),
             notes=(
                 *query_notes(query, present, part.taxonomy),
                 *_unused_notes(query, self.method),

@@ -21,6 +21,7 @@ from semsig_gis.localization.answers import (
     REGION_SHARE,
     Answer,
     Ranking,
+    answer_licenses,
     candidate_columns,
     check_top,
     doubt_parts,
@@ -567,6 +568,7 @@ class LikelihoodLocator:
         answer = self.rule.decide(posterior, places=places)
         radius, sigma = self.rule.radius, self.north_sigma
         database, noise = self.index.database, self.index.noise
+        city = self.store if self.city is None else self.city
         estimate = None
         if parts is not None:
             xy = answer.x, answer.y
@@ -592,7 +594,7 @@ class LikelihoodLocator:
             cells=len(scores.loglik),
             crs=database.crs,
             taxonomy=database.taxonomy,
-            licenses=database.licenses,
+            licenses=answer_licenses(database, city),
             notes=(
                 *query_notes(query, database.present_codes, database.taxonomy),
                 *_prior_notes(ratio),
@@ -608,7 +610,7 @@ class LikelihoodLocator:
             known=self.known,
             prior_ratio=ratio,
             north=self.north,
-            city=self.store if self.city is None else self.city,
+            city=city,
             headings=scores.headings,
             versions=tuple(shares.tolist()),
         )
