@@ -179,6 +179,10 @@ def test_marks_are_edited_by_mouse_and_keyboard(
     workbench.choose("#kind", "equirectangular")
     photo = workbench.ask("return semsig.session.scene")
     assert (photo["fov"], photo["heading"], photo["heading_error"]) == (360, 200, 10)
+    for kind, fov in (("fisheye", 180), ("cylindrical", 360), ("pinhole", None)):
+        workbench.choose("#kind", kind)
+        assert workbench.ask("return semsig.session.scene.fov") == fov
+    assert workbench.one("#fov-known").get_attribute("value") == ""
     workbench.choose("#heading-known", "")
     assert workbench.ask("return semsig.session.scene.heading") is None
 
@@ -309,6 +313,24 @@ def test_marks_and_answers_are_undone_and_not_lost(
     workbench.press("#undo")
     assert workbench.ask(classes) == [first, "bench"]
     assert workbench.all(f"{STAGE} img")
+
+
+def test_settings_of_two_photos_are_two_steps(
+    workbench: WorkbenchPage, photos: list[StreetPhoto]
+) -> None:
+    for photo in photos:
+        workbench.give("#photo", photo.file)
+        workbench.choose("#heading-known", "known")
+    headings = "return semsig.session.scenes.map(({heading}) => heading)"
+    for name, heading in (("ahead.jpg", 100), ("behind.jpg", 200)):
+        workbench.press(".tab", name)
+        workbench.slide("#heading", heading - 10)
+        workbench.slide("#heading", heading)
+    assert workbench.ask(headings) == [100, 200]
+    workbench.press("#undo")
+    assert workbench.ask(headings) == [100, 0]
+    workbench.press("#undo")
+    assert workbench.ask(headings) == [0, 0]
 
 
 def test_unknown_field_of_view_and_refined_numbers_are_shown(

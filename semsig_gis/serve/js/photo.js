@@ -318,7 +318,7 @@ semsig.camera = (session, photo) => {
     fisheye: "fisheye"};
   const kind = semsig.select(line("Kind"), kinds, photo.projection, (value) => {
     photo.projection = value;
-    photo.fov = {pinhole: null, fisheye: 180}[value] || 360;
+    photo.fov = value === "pinhole" ? null : value === "fisheye" ? 180 : 360;
     session.show(photo, session.mark);
     session.changed();
   });

@@ -22,7 +22,8 @@ semsig.Session = class extends EventTarget {
   constructor(city) {
     super();
     Object.assign(this, {city, noise: null, seenFrom: "anywhere", brush: null, asking: false,
-      page: crypto.randomUUID(), closer: null, past: [], future: [], gesture: null});
+      page: crypto.randomUUID(), closer: null, past: [], future: [], gesture: null,
+      gestureScene: null});
     this.clear();
     this.present = this.savedPresent = this.state();
   }
@@ -36,12 +37,13 @@ semsig.Session = class extends EventTarget {
     const some = this.scenes.some((scene) => (scene.marks || scene.compass).length);
     return some && !this.truth && this.present !== this.savedPresent;
   }
-  // Remembers the state before a change; the changes of one gesture are one step.
+  // Remembers the state before a change; the changes of one gesture in one scene are one step.
   remember(gesture) {
     const now = this.state();
     if (now === this.present) return;
-    if (gesture === null || gesture !== this.gesture) this.past.push(this.present);
-    Object.assign(this, {present: now, future: [], gesture});
+    const same = gesture !== null && gesture === this.gesture && this.scene === this.gestureScene;
+    if (!same) this.past.push(this.present);
+    Object.assign(this, {present: now, future: [], gesture, gestureScene: this.scene});
   }
   undo() {
     this.goBack(this.past, this.future);
