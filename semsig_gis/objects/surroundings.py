@@ -180,7 +180,7 @@ def save_ground(
     paths = {role: ground_file(objects, role) for role in roles}
     present = [role for role in roles if paths[role].exists()]
     foreign = [role for role in present if not _is_ground(paths[role])]
-    written = {
+    written: dict[str, Path] = {
         role: paths[role] for role, table in roles.items() if table is not None and len(table)
     }
     if others := [str(paths[role]) for role in foreign if role in written]:
@@ -194,9 +194,10 @@ def save_ground(
         elif role not in written:
             paths[role].unlink()
             remark(f"{paths[role]}, of earlier objects, was removed")
-    for role, path in written.items():
-        _save(roles[role], path, {GROUND: True})
-    return {**written}
+    for role, table in roles.items():
+        if role in written:
+            _save(table, written[role], {GROUND: True})
+    return written
 
 
 def _is_ground(path: Path) -> bool:

@@ -142,7 +142,7 @@ def test_database_keeps_the_last_indexes() -> None:
 @pytest.mark.parametrize("name", sorted(NOISES))
 def test_index_of_every_noise_is_used_again(name: str) -> None:
     database = random_town().database
-    method = parse_method(f"likelihood:{name}")
+    method = LikelihoodMethod.parse(f"likelihood:{name}")
     assert method_index(database, method) is method_index(database, method)
     assert len(database.memo) == 1
 
