@@ -240,8 +240,12 @@ class City(Displayed):
         return map_with("ambiguity_map", self.database, ground=ground)
 
     def export(self, path: str | Path) -> None:
-        """Write the cells and the street objects in the format of a suffix (`export_database`)."""
-        inputs = {} if self.objects is None else {"objects": self.objects, **self.store.ground}
+        """Write the cells and the street objects in the format of a suffix (`export_database`).
+
+        DatabaseError if there is an object store that cannot be used, for example because another
+        program has changed it.
+        """
+        inputs = {"objects": self.store.objects, **self.store.ground} if self.has_store else {}
         export_with("export_database", self.database, path, **inputs)
 
     def columns(self, name: str) -> tuple[pa.Table, dict[str, Any]] | None:

@@ -25,7 +25,7 @@ FAR_M = 300.0
 class PlaceNames:
     """The named streets and buildings of a city, in R-trees.
 
-    `streets` and `buildings` are in one metric CRS; rows without a name are not used.
+    `streets` and `buildings` are in one metric CRS; rows without a name that is text are not used.
     """
 
     def __init__(
@@ -79,7 +79,8 @@ class _Named:
     def __init__(self, table: gpd.GeoDataFrame | None) -> None:
         shapes, names = np.empty(0, object), np.empty(0, object)
         if table is not None and NAME in table:
-            names = table[NAME].fillna("").astype(str).str.strip().to_numpy(object)
+            texts = [name.strip() if isinstance(name, str) else "" for name in table[NAME]]
+            names = np.array(texts, dtype=object)
             shapes = table.geometry.to_numpy()
         self._shapes, self._names = shapes[names != ""], names[names != ""]
         self._tree = shapely.STRtree(self._shapes)

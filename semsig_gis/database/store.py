@@ -203,6 +203,9 @@ def _stored(table: gpd.GeoDataFrame, crs: CRS, *names: str) -> gpd.GeoDataFrame:
     geometry = table.geometry
     rows = reproject(table[~(geometry.isna() | geometry.is_empty)], crs)
     columns = {name: rows[name].to_numpy() for name in names if name in rows}
+    if NAME in columns:  # a file of a user may have names that are not text
+        texts = [name if isinstance(name, str) else "" for name in columns[NAME]]
+        columns[NAME] = np.array(texts, dtype=object)
     stored = gpd.GeoDataFrame(columns, geometry=rows.geometry.to_numpy(), crs=rows.crs)
     stored.attrs[LICENSES] = list(licenses_of(table))
     return stored

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,7 +13,7 @@ import shapely
 from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 
-from semsig_gis.core import CLASS_NAME, LICENSES, InputError, SourceError
+from semsig_gis.core import CLASS_NAME, LICENSES, NAME, InputError, SourceError
 from semsig_gis.objects.table import layer_licences
 from semsig_gis.sources import (
     NUMBERS,
@@ -26,6 +27,7 @@ from semsig_gis.sources import (
     frame_layers,
     has_element_columns,
     join_areas,
+    list_layers,
     load_catalog,
     parse_area,
     parse_crs,
@@ -329,7 +331,13 @@ def _read_file(
         return _with_licences(layer), layer.notes
     if path.suffix.lower() in SUFFIXES:
         return read_parquet(path, kind=f"{kind}s", box=box), ()
-    (layer,) = reader("vector_file")(path, [LayerSpec(name=role, class_name="", geometry=kind)])
+    spec = LayerSpec(name=role, class_name="", geometry=kind)
+    if role != "area":
+        fields = [field for layer in list_layers(path) for field in layer.fields]
+        spec = replace(
+            spec, name_field=next((name for name in fields if name.lower() == NAME), None)
+        )
+    (layer,) = reader("vector_file")(path, [spec])
     if layer.errors:
         raise SourceError(
             f"{path} has {layer.counts.unreadable} features that cannot be read "

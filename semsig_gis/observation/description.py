@@ -81,6 +81,8 @@ def read_description(view: AnyView, *, taxonomy: Taxonomy, radius: float = RADIU
         row, in_words = text_row(view, taxonomy), True
     elif isinstance(view, Mapping):
         row, in_words = dict(view), "see" in view
+        if isinstance(text := row.get("see"), str) and not text.strip():
+            raise InputError(f"the text of what was seen is empty; {FORMS}.")
         if all(row.get(name) is None for name in SEEN):
             near = nearest_name(next((str(key) for key in row if key not in SEEN), ""), SEEN)
             raise InputError(

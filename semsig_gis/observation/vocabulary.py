@@ -80,7 +80,7 @@ class Vocabulary:
     @classmethod
     def of(cls, words: Sequence[str], taxonomy: Taxonomy) -> Vocabulary:
         """Return the vocabulary of the language that knows most of the words, English first."""
-        terms = class_words(taxonomy)
+        terms, others = _terms(taxonomy)
 
         def count(language: str) -> int:
             letters, own = _phrases()[language]["letters"], _own_words(terms, language)
@@ -88,7 +88,7 @@ class Vocabulary:
                 word in letters if is_point(word) else plain_word(word) in own for word in words
             )
 
-        return _vocabulary(terms, other_class_words(taxonomy), max(_phrases(), key=count))
+        return _vocabulary(terms, others, max(_phrases(), key=count))
 
     def class_of(self, words: Sequence[str]) -> int | None:
         """Return the class code for the words of a thing, None if they are for no class."""
@@ -118,6 +118,12 @@ class Vocabulary:
         return nearest_name(text, self.names)
 
 
+@functools.lru_cache(maxsize=64)
+def _terms(taxonomy: Taxonomy) -> tuple[Terms, Terms]:
+    """Return the words for the classes, and those for classes that a taxonomy has not."""
+    return class_words(taxonomy), other_class_words(taxonomy)
+
+
 @functools.cache
 def _phrases() -> dict[str, dict[str, Any]]:
     """Return the tables of ``phrases.toml`` by language."""
@@ -137,11 +143,15 @@ def _meanings(language: str) -> dict[Words, Meaning]:
 
 @functools.cache
 def _shared() -> dict[Words, Meaning]:
-    """Return the phrases that have the same meaning in all languages that have them."""
+    """Return the phrases that have the same meaning in all languages that have them.
+
+    Letters are left out: "n" may be for north.
+    """
     meanings: dict[Words, set[Meaning]] = {}
     for language in _phrases():
         for words, meaning in _meanings(language).items():
-            meanings.setdefault(words, set()).add(meaning)
+            if words != (words[0][0],):
+                meanings.setdefault(words, set()).add(meaning)
     return {words: next(iter(values)) for words, values in meanings.items() if len(values) == 1}
 
 

@@ -191,7 +191,7 @@ def class_words(
     The language of names and titles is empty, because they may be in any. Words that only people
     say may be limited to the languages `languages`.
     """
-    words = [("", WILDCARD, "unknown")]
+    words = [("", WILDCARD, "unknown"), ("en", WILDCARD, "something")]
     for item in taxonomy.classes:
         words += [("", item.code, item.title), *_keywords(item.name, item.code, languages)]
     return tuple(words)

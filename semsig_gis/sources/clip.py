@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import shapely
 
-from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, InputError
+from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, EmptyResultError, InputError
 from semsig_gis.sources import vector
 from semsig_gis.sources.area import Area, exchanged_error, join_areas
 from semsig_gis.sources.layer import transformed
@@ -142,6 +142,13 @@ def clip_to_extents(layers: Sequence[RawLayer]) -> tuple[tuple[RawLayer, ...], s
         layer if layer.extent is None else clip_layer(layer, layer.extent) for layer in layers
     )
     outside = sum(len(layer) for layer in layers) - sum(len(layer) for layer in clipped)
+    if outside and not sum(len(layer) for layer in clipped if layer.spec.role == "objects"):
+        boxes = {layer.extent.polygon.bounds: None for layer in layers if layer.extent is not None}
+        texts = [",".join(f"{side:.7g}" for side in box) for box in boxes]
+        raise EmptyResultError(
+            f"no object is in the box that OpenStreetMap files state ({' and '.join(texts)}); give "
+            f"--clip {NO_CLIP} to keep what is beyond it, or a box."
+        )
     note = (
         f"clipped to the box that OpenStreetMap files state: {outside:,} row"
         f"{'' if outside == 1 else 's'} beyond it left out (--clip {NO_CLIP} keeps them)"

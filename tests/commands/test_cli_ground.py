@@ -199,6 +199,39 @@ def test_streets_are_kept_for_every_choice_of_viewpoints(town: Path, run_ok: Run
     assert ground_rows(open_city(town / "tiles").store)[1] == 1
 
 
+@pytest.mark.parametrize("lanes", ["lanes.geojson", "lanes.gpkg"])
+def test_names_of_streets_of_a_user_are_used(town: Path, run_ok: RunOk, lanes: str) -> None:
+    run_ok(f"{LOAD} --no-ground")
+    line = shapely.LineString([(LON - 0.001, LAT), (LON + 0.001, LAT)])
+    gpd.GeoDataFrame({"Name": ["My Lane"]}, geometry=[line], crs=4326).to_file(town / lanes)
+    run_ok(f"build town.parquet --out city.parquet --streets {lanes}")
+    city = open_city("city.parquet")
+    assert city.place_name(*city.database.xy[0]) == "on My Lane"
+
+
+@pytest.mark.parametrize("names", [[0.748], [["a", "b"]], [None]])
+def test_names_that_are_not_text_are_not_used(
+    town: Path,
+    run_ok: RunOk,
+    names: list[object],
+) -> None:
+    run_ok(f"{LOAD} --no-ground")
+    line = shapely.LineString([(LON - 0.001, LAT), (LON + 0.001, LAT)])
+    gpd.GeoDataFrame({"name": names}, geometry=[line], crs=4326).to_parquet(town / "own.parquet")
+    for out in ("city.parquet", "tiles --tile 100"):
+        run_ok(f"build town.parquet --out {out} --streets own.parquet")
+        answer = json.loads(run_ok(f"localize {out.split()[0]} {QUERY} --map map.html"))
+        assert answer["place"]["name"] == ""
+
+
+def test_box_of_a_file_that_holds_no_object_is_named(town: Path, run: Run) -> None:
+    text = (town / "town.osm").read_text("utf-8")
+    box = '<bounds minlat="1" minlon="2" maxlat="3" maxlon="4"/>'
+    start = text.index("<node")
+    (town / "town.osm").write_text(text[:start] + box + text[start:], "utf-8")
+    sentence(run(LOAD), "2,1,4,3", "--clip none")
+
+
 def test_update_and_merge_keep_the_ground(town: Path, run_ok: RunOk) -> None:  # noqa: ARG001
     run_ok(LOAD)
     for name, options in (("city.parquet", ""), ("tiles", "--tile 100")):

@@ -16,7 +16,13 @@ from noisy_cells import column
 from sentences import refused
 
 from semsig_gis.core import SemsigError
-from semsig_gis.observation import GUESS_ERROR, Photo, parse_seen, parse_view
+from semsig_gis.observation import (
+    GUESS_ERROR,
+    Photo,
+    parse_seen,
+    parse_view,
+    read_description,
+)
 from semsig_gis.sources import data_folder, load_catalog
 
 if TYPE_CHECKING:
@@ -193,6 +199,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"see": "lamp at 2, on the left"}, "'on the left' does not say what is there"),
     ({"see": "tree left and right, bench behind"}, "'right' does not say what is there"),
     ({"see": "tree to the left and to the right, bench"}, "'to the right' does not say what"),
+    ({"see": "lamp n"}, "'n' in 'lamp n' is not understood"),
     ({"see": "lamp at 40,80"}, "the number 80 in '80' is not clear"),
     ({"see": "lamp 1,000 m left"}, "the number 1,000 is not clear"),
     ({"see": "trees (3) left"}, "the number (3) is not clear"),
@@ -381,6 +388,17 @@ def test_error_of_the_direction_of_sight_is_for_directions_from_it(
     view = read({"see": text})
     assert view.photos[0].north_sigma == north
     assert parsed({"see": text}).get("bearing_errors") == errors
+
+
+def test_something_is_of_any_class() -> None:
+    assert parsed({"see": "something at 40, bench at 80"})["types"] == "?L"
+
+
+@pytest.mark.parametrize("view", ["", " ", {"see": ""}, ",", {"see": ";"}, {"see": None}])
+def test_descriptions_without_words_are_refused(view: Any) -> None:  # noqa: ANN401
+    with pytest.raises(SemsigError, match=r"empty|does not say|do not say") as caught:
+        read_description(view, taxonomy=TAXONOMY)
+    assert "nearest" not in str(caught.value)
 
 
 def test_words_that_are_not_used_are_noted() -> None:
