@@ -188,7 +188,7 @@ def save_ground(
     if others := [str(paths[role]) for role in foreign if role in written]:
         raise InputError(
             f"{' and '.join(others)} would be replaced, but semsig did not write it as part of "
-            f"{objects}; rename it, write to another file, or leave out --ground (--no-ground)."
+            f"{objects}; rename it, write to another file, or give --no-ground."
         )
     for role in present:
         if role in foreign:

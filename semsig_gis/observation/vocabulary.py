@@ -80,15 +80,14 @@ class Vocabulary:
     @classmethod
     def of(cls, words: Sequence[str], taxonomy: Taxonomy) -> Vocabulary:
         """Return the vocabulary of the language that knows most of the words, English first."""
-        terms, others = _terms(taxonomy)
 
         def count(language: str) -> int:
-            letters, own = _phrases()[language]["letters"], _own_words(terms, language)
+            letters, own = _phrases()[language]["letters"], _own_words(taxonomy, language)
             return sum(
                 word in letters if is_point(word) else plain_word(word) in own for word in words
             )
 
-        return _vocabulary(terms, others, max(_phrases(), key=count))
+        return _vocabulary(taxonomy, max(_phrases(), key=count))
 
     def class_of(self, words: Sequence[str]) -> int | None:
         """Return the class code for the words of a thing, None if they are for no class."""
@@ -116,12 +115,6 @@ class Vocabulary:
     def nearest(self, text: str) -> str:
         """Return ``"; the nearest is 'x'"`` for the nearest word of the language, or nothing."""
         return nearest_name(text, self.names)
-
-
-@functools.lru_cache(maxsize=64)
-def _terms(taxonomy: Taxonomy) -> tuple[Terms, Terms]:
-    """Return the words for the classes, and those for classes that a taxonomy has not."""
-    return class_words(taxonomy), other_class_words(taxonomy)
 
 
 @functools.cache
@@ -178,7 +171,8 @@ def _by_form(terms: Terms, language: str) -> dict[str, int]:
 
 
 @functools.lru_cache(maxsize=64)
-def _vocabulary(terms: Terms, others: Terms, language: str) -> Vocabulary:
+def _vocabulary(taxonomy: Taxonomy, language: str) -> Vocabulary:
+    terms, others = class_words(taxonomy), other_class_words(taxonomy)
     names = tuple(word for name, _, word in terms if name in {"", language})
     return Vocabulary(
         language=language,
@@ -191,12 +185,12 @@ def _vocabulary(terms: Terms, others: Terms, language: str) -> Vocabulary:
 
 
 @functools.lru_cache(maxsize=64)
-def _own_words(terms: Terms, language: str) -> frozenset[str]:
+def _own_words(taxonomy: Taxonomy, language: str) -> frozenset[str]:
     """Return the single words of a language."""
     endings = ["", *_phrases()[language]["endings"]]
     things = {
         word + ending
-        for name, _, phrase in terms
+        for name, _, phrase in class_words(taxonomy)
         if name == language
         for word in map(plain_word, phrase.split())
         for ending in endings

@@ -140,6 +140,17 @@ def test_a_city_is_drawn_and_exported_as_its_database(tmp_path: Path) -> None:
     assert city.explore().page.count(layer) > page.count(layer)
 
 
+def test_a_city_that_was_replaced_is_not_exported_in_part(tmp_path: Path) -> None:
+    path = tmp_path / "city.parquet"
+    build(TOWN, path, step=10.0)
+    city = open_city(path)
+    assert len(city.database)
+    build(TOWN, path, step=20.0)
+    with refused(DatabaseError, "city.parquet"):
+        city.export(tmp_path / "city.gpkg")
+    assert not (tmp_path / "city.gpkg").exists()
+
+
 def test_files_that_are_not_databases_are_refused(tmp_path: Path) -> None:
     nowhere = City(tmp_path / "nowhere.parquet")
     for act in (
