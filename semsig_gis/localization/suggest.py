@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -251,15 +252,15 @@ def with_unplaced(
             f"the query has {what}, which the method {str(locator.method)!r} cannot take; give "
             "directions to all objects or to none, or leave out the method."
         )
-    by_code = locator.index.database.taxonomy.by_code
+    words = locator.index.database.taxonomy.words
     grid_query = locator.north.to_grid(query)
     headings = locator.scan(query).headings if absent and _has_sectors(query) else (None,)
     prior = unplaced_prior(locator.index, grid_query, unplaced, absent=absent, headings=headings)
     used = locator.index.table.codes
     titles = {
         name: [
-            by_code(code).title.lower() + ("" if code in used else " (not used, the map has none)")
-            for code in codes
+            words(list(group)) + ("" if code in used else " (not used, the map has none)")
+            for code, group in itertools.groupby(codes)
         ]
         for name, codes in (("seen", unplaced), ("absent", absent))
         if codes
@@ -268,6 +269,8 @@ def with_unplaced(
         locator,
         log_prior=prior if locator.log_prior is None else locator.log_prior + prior,
         known={**locator.known, **titles},
+        unplaced=tuple(unplaced),
+        absent=tuple(absent),
     )
 
 

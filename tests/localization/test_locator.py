@@ -105,6 +105,32 @@ def test_absent_and_undirected_objects_are_used() -> None:
         localize(CITY, f"{SENTENCE}, bus stop", method=PAPER_METHOD)
 
 
+def test_objects_without_direction_are_explained() -> None:
+    codes = QUERY.codes.tolist()
+    # The objects of the last class have no direction, and one more of it is said than is there.
+    *_, last = codes
+    kept = [number for number, code in enumerate(codes) if code != last]
+    title = CITY.taxonomy.words([last])
+    pairs = [
+        (CITY.taxonomy.by_code(codes[number]).name, float(QUERY.bearings[number]))
+        for number in kept
+    ]
+    count = codes.count(last)
+    absent = next(code for code in CITY.present_codes.tolist() if code not in codes)
+    none = f"no {CITY.taxonomy.words([absent])}"
+    said = ", ".join([*(f"{name} at {at:.0f}" for name, at in pairs), *[title] * (count + 1), none])
+    answer = localize(CITY, said)
+    assert answer.unplaced == (last,) * (count + 1)
+    table = answer.explain().set_index("you said")
+    here = answer.posterior.database.select([answer.columns["cell"][0]])
+    standing = here.codes.tolist().count(last)
+    there = table.loc[[title], "verdict"].tolist()
+    assert there.count("is there") == min(standing, count + 1)
+    assert table.loc[none, "verdict"] in {"is not there", "is there"}
+    undirected, _ = answer.without_direction(answer.explanations[0])
+    assert len(undirected) == min(standing, count + 1)
+
+
 def test_answer_says_where_and_why(tmp_path: Path) -> None:
     answer = localize(open_city(save_town(tmp_path, TOWN)), QUERY)
     place = answer.to_dict()["place"]
@@ -174,9 +200,11 @@ def test_other_forms_of_a_view_are_refused(view: Any, parts: tuple[str, ...]) ->
         localize(CITY, view)
 
 
-@pytest.mark.parametrize("where", [7, TOWN.street_objects])
-def test_other_places_to_search_are_refused(where: Any) -> None:  # noqa: ANN401 - any value of a user
-    with refused(InputError, type(where).__name__, "open_city"):
+@pytest.mark.parametrize(
+    ("where", "words"), [(7, "a int"), (TOWN.street_objects, "street objects")]
+)
+def test_other_places_to_search_are_refused(where: Any, words: str) -> None:  # noqa: ANN401 - any value of a user
+    with refused(InputError, words, "build", "open_city"):
         localize(where, SENTENCE)
 
 
@@ -196,3 +224,8 @@ def test_evaluation_accepts_text_of_method(method: str) -> None:
     assert str(evaluation.method) == str(same.method)
     with refused(InputError, "refined"):
         evaluate(CITY, method="likelihood:generic:refined", **settings)
+
+
+def test_path_of_street_objects_is_no_table() -> None:
+    with refused(InputError, "objects.parquet", "open_objects"):
+        semsig_gis.build("objects.parquet")

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
-from semsig_gis.core import InputError, cell_ids, export_with, map_with, percent, to_degrees
+from semsig_gis.core import InputError, cell_ids, export_with, map_with, percent
 from semsig_gis.localization.answers import (
     LEAST_ELSEWHERE,
     REGION_SHARE,
@@ -137,6 +138,8 @@ class Location(Answer):
         By photo, the degrees to add to its bearings in each cell; None where they are known.
     versions : tuple of float
         Chance of each version of the query (see `locate_versions`); `query` is the likeliest.
+    unplaced, absent : tuple of int
+        Class codes of objects that were seen without a direction, or looked for and not seen.
 
     Examples
     --------
@@ -161,6 +164,8 @@ class Location(Answer):
     fit: float | None = None
     headings: tuple[NDArray[np.float32] | None, ...] = (None,)
     versions: tuple[float, ...] = (1.0,)
+    unplaced: tuple[int, ...] = ()
+    absent: tuple[int, ...] = ()
 
     def _facts(self) -> dict[str, object]:
         sure = self.answer.given
@@ -231,12 +236,6 @@ class Location(Answer):
         return self.estimate.x, self.estimate.y
 
     @property
-    def degrees(self) -> tuple[float, float]:
-        """Longitude and latitude of the estimated place, rounded to 1 cm."""
-        lon, lat = to_degrees(self.crs).transform(self.estimate.x, self.estimate.y)
-        return round(lon, 7), round(lat, 7)
-
-    @property
     def chance(self) -> float:
         """The chance of being within the radius of `rule`, 50 m, of the best place."""
         return self.answer.mass
@@ -245,7 +244,8 @@ class Location(Answer):
         """Return what was seen next to what stands there, for the likeliest place.
 
         The columns are ``you said``, ``is there``, the ``verdict`` in words and its ``chance``.
-        InputError if the answer has no explanations: they need bearings.
+        Objects said without a direction are among them, and those said to be absent are the last
+        rows. InputError if the answer has no explanations: they need bearings.
         """
         import pandas as pd  # noqa: PLC0415 - it takes 0.25 s
 
@@ -264,16 +264,46 @@ class Location(Answer):
             at = "" if bearing is None else f" at {bearing:.0f}°"
             return f"{title}{at}" + ("" if metres is None else f", {metres:.0f} m")
 
-        rows = [
-            (
-                described(row["query_class"], row["query_bearing"], row["query_range"]),
-                described(row["object_class"], row["object_bearing"], row["distance"]),
-                IN_WORDS[row["verdict"]],
-                round(row["chance"], 2),
-            )
-            for row in self.explanations[0].to_dict(self.north)["rows"]
+        undirected, rest = self.without_direction(self.explanations[0])
+        rows = []
+        for number, row in enumerate(self.explanations[0].to_dict(self.north)["rows"]):
+            said = described(row["query_class"], row["query_bearing"], row["query_range"])
+            verdict = row["verdict"]
+            if number in undirected:
+                said, verdict = described(row["object_class"], None, None), "matched"
+            there = described(row["object_class"], row["object_bearing"], row["distance"])
+            rows.append((said, there, IN_WORDS[verdict], round(row["chance"], 2)))
+        rows += [
+            (said, there, IN_WORDS["matched" if there else "false"], math.nan)
+            for said, there in rest
         ]
         return pd.DataFrame(rows, columns=["you said", "is there", "verdict", "chance"])
+
+    def without_direction(self, explanation: Explanation) -> tuple[set[int], list[tuple[str, str]]]:
+        """Return what was said without a direction, or to be absent, and what is there.
+
+        The first are the numbers of rows of objects that were not said otherwise: of each class the
+        nearest, as many as were said. The others are pairs of words: what was said, and what is
+        there, which may be empty.
+        """
+        words, left = self.taxonomy.words, Counter(self.unplaced)
+        missed = {
+            number: self.taxonomy.by_name(row["object_class"]).code
+            for number, row in enumerate(explanation.rows)
+            if row["verdict"] == "missed"
+        }
+        found = set()
+        for number in sorted(missed, key=lambda number: explanation.rows[number]["distance"]):
+            if left[missed[number]]:
+                left[missed[number]] -= 1
+                found.add(number)
+        more = Counter(code for number, code in missed.items() if number not in found)
+        rest = [(words([code] * count), "") for code, count in left.items() if count]
+        rest += [
+            (f"no {words([code])}", words([code] * more[code]) if more[code] else "")
+            for code in self.absent
+        ]
+        return found, rest
 
     @property
     def chances(self) -> NDArray[np.float64]:
@@ -313,7 +343,7 @@ class Location(Answer):
         first of them, ``explanation``, with bearings from ``north`` like those of the query.
         ``prior`` has the keys of `known` and ``ratio``; it is None without a prior.
         """
-        lon, lat = self.degrees
+        lat, lon = self.latlon
         candidates = self.candidate_rows()
         for candidate, why in zip(candidates, self.explanations, strict=False):
             candidate["explanation"] = why.to_dict(self.north)
@@ -379,6 +409,8 @@ class LikelihoodLocator:
     incremental: IncrementalIndex | None = None
     surely_here: bool = False
     city: City | ObjectStore | None = None
+    unplaced: tuple[int, ...] = ()
+    absent: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -613,6 +645,8 @@ class LikelihoodLocator:
             city=city,
             headings=scores.headings,
             versions=tuple(shares.tolist()),
+            unplaced=self.unplaced,
+            absent=self.absent,
         )
         return location.doubted(elsewhere, fit)
 

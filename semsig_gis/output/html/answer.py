@@ -196,13 +196,18 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
         text = ", ".join(filter(None, (turn, away)))
         return {"symbol": symbols.get(name, "?"), "text": text}
 
+    undirected, others = set[int](), list[tuple[str, str]]()
+    if rank <= len(location.explanations):
+        undirected, others = location.without_direction(location.explanations[rank - 1])
     rays = [
         {
             **{name: row[name] for name in ("verdict", "to", "sign")},
-            "said": part(row["seen_class"], row["seen_bearing"], row["seen_range"]),
+            "said": part(row["seen_class"], row["seen_bearing"], row["seen_range"])
+            if number not in undirected
+            else {**part(row["object_class"], None, None), "text": "no direction"},
             "there": part(row["object_class"], row["bearing"], row["distance"]),
         }
-        for row in candidate["rays"]
+        for number, row in enumerate(candidate["rays"])
         if row["verdict"] in COUNTED
     ]
     # Objects of classes that the map does not have are no part of an explanation.
@@ -213,6 +218,7 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
     visible = database.codes[slice(*database.offsets[candidate["cell"] :][:2])]
     there = "none on this map" if rays else words(visible)
     more = [[words(rest), there]] if rest else []
+    more += [[said, found or "none in sight"] for said, found in others]
     lat, lon = candidate["rays"][0]["from"] if candidate["rays"] else candidate["place"]
     best = exact_latlon(location.xy, location.crs)[0] if rank == 1 else [lat, lon]
     sure = location.answer.given

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import Table, figure, percent, signed_degrees, to_degrees
-from semsig_gis.localization import Location
+from semsig_gis.localization import VERDICTS, Location
 from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from semsig_gis.localization import Answer, ClassQuestion, Explanation, Localization
     from semsig_gis.observation import Photo
 
+NO_DIRECTION = "said without direction"
+"""The verdict on an object of a class that was said without a direction."""
 LINKS = 2  # addresses below an answer; the details have all
 QUESTIONS = 5  # best ones of those to ask next; the details have all
 EXPLANATION = (
@@ -129,7 +132,7 @@ def route_summary(
     rows = (
         (
             str(name),
-            *_position(location.estimate.x, location.estimate.y, *location.degrees),
+            *_position(*location.xy, *location.latlon[::-1]),
             f"{location.estimate.sigma:.1f}",
             percent(location.answer.mass),
             "yes" if location.answer.given else "cannot tell",
@@ -164,7 +167,7 @@ def place_sentences(location: Location) -> list[str]:
 
     Without an answer, the region comes first.
     """
-    sure, (lon, lat) = location.answer.given, location.degrees
+    sure, (lat, lon) = location.answer.given, location.latlon
     place = (
         f"{'' if sure else 'Best place: '}{lat:.6f}, {lon:.6f} (lat, lon){_place(location)}: "
         f"within {location.rule.radius:g} m with a chance of {percent(location.answer.mass)}."
@@ -184,7 +187,7 @@ def position_sentences(location: Location) -> list[str]:
     Without an answer, they begin with "if it is there", and the region is elsewhere.
     """
     estimate, sure = location.estimate, location.answer.given
-    x, y, *_ = _position(estimate.x, estimate.y, *location.degrees)
+    x, y, *_ = _position(*location.xy, *location.latlon[::-1])
     there = "" if sure else "If it is there: "
     longer, shorter, bearing = estimate.ellipse()
     sentences = [
@@ -320,9 +323,14 @@ def _direction(bearing: float, photo: Photo) -> str:
 
 def _explanation_table(rank: int, explanation: Explanation, answer: Location) -> Table | str:
     """Return the counts of a candidate; for the best one, a table of its objects."""
-    rows, counts = explanation.rows, explanation.counts
-    outside = len(rows) - sum(counts.values())
-    texts = [f"{count} {verdict}" for verdict, count in counts.items()]
+    rows: list[Any] = [dict(row) for row in explanation.rows]
+    undirected, _ = answer.without_direction(explanation)
+    for number in undirected:
+        rows[number] |= {"verdict": NO_DIRECTION, "query_class": rows[number]["object_class"]}
+    verdicts = [*VERDICTS, *([NO_DIRECTION] if undirected else [])]
+    found = Counter(row["verdict"] for row in rows)
+    outside = len(rows) - sum(found[verdict] for verdict in verdicts)
+    texts = [f"{found[verdict]} {verdict}" for verdict in verdicts]
     summary = ", ".join(texts) + (f"; {outside} outside the photos" if outside else "")
     lon, lat = to_degrees(answer.crs).transform(*explanation.xy)
     title = f"Place {rank}, {lat:.6f}, {lon:.6f} (lat, lon): {summary}."
@@ -337,8 +345,8 @@ def _explanation_table(rank: int, explanation: Explanation, answer: Location) ->
         return measure(None if bearing is None else answer.north.from_grid(bearing), ".1f", "°")
 
     shown = sorted(
-        (row for row in rows if row["verdict"] in counts),
-        key=lambda row: [*counts].index(row["verdict"]),
+        (row for row in rows if row["verdict"] in verdicts),
+        key=lambda row: verdicts.index(row["verdict"]),
     )
     return Table(
         title,

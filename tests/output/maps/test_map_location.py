@@ -99,7 +99,7 @@ def test_first_view_shows_what_was_said_next_to_what_is_there(page: MapPage) -> 
     page.open(location_map(location))
     assert page.all(".semsig-legend[open], .leaflet-control-layers-expanded") == []
     text = page.panel().replace("\u00a0", " ")
-    lat, lon = location.degrees[::-1]
+    lat, lon = location.latlon
     chance, place = percent(location.answer.mass), f"{lat:.6f}, {lon:.6f}"
     for words in ("Found", "On High Street", chance, place):
         assert words in text
