@@ -77,7 +77,7 @@ class Demo:
 
         city_file = self.out / "city.parquet"
         with reporter.progress("building a town") as advance:
-            objects, surroundings, database = self._town(advance)
+            objects, surroundings, database = self._town(advance, reporter)
         save_with_store(database, ObjectStore.of(objects, **surroundings), city_file)
         city = open_city(city_file)
         with reporter.progress("evaluating") as advance:
@@ -90,7 +90,12 @@ class Demo:
         with reporter.progress("writing the GeoPackage") as advance:
             geopackage = self.out / "city.gpkg"
             export_database(
-                database, geopackage, objects=objects, evaluation=evaluation, progress=advance
+                database,
+                geopackage,
+                objects=objects,
+                evaluation=evaluation,
+                **city.store.ground,
+                progress=advance,
             )
         files |= {"layers for QGIS": geopackage, "signature database": city_file}
         values: Demonstrated = {
@@ -106,10 +111,14 @@ class Demo:
             notes=notes,
         )
 
-    def _town(self, advance: Any) -> tuple[Any, dict[str, Any], Any]:  # noqa: ANN401 - slow to import
+    def _town(
+        self,
+        advance: Any,  # noqa: ANN401 - slow to import
+        reporter: Reporter,
+    ) -> tuple[Any, dict[str, Any], Any]:
         """Return the street objects, the buildings and streets, and the database of a town."""
         from semsig_gis.database import ViewpointSpec, build_database
-        from semsig_gis.objects import build_objects, save_objects, save_surroundings
+        from semsig_gis.objects import build_objects, save_ground, save_objects
         from semsig_gis.sources import (
             CitySpec,
             paper_taxonomy,
@@ -122,9 +131,9 @@ class Demo:
         objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
         houses, streets = (layer.table for layer in synthetic_surroundings(spec))
         streets = streets.assign(name=[f"Street {number}" for number in streets["source_id"]])
-        save_objects(objects, self.out / "objects.parquet")
-        for name, table in (("buildings", houses), ("streets", streets)):
-            save_surroundings(table, self.out / f"{name}.parquet")
+        objects_file = self.out / "objects.parquet"
+        save_ground(objects_file, buildings=houses, streets=streets, remark=reporter.remark)
+        save_objects(objects, objects_file)
         surroundings = {"footprints": houses, "streets": streets}
         database = build_database(
             objects, viewpoints=ViewpointSpec(mode="streets"), progress=advance, **surroundings

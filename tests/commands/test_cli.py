@@ -22,7 +22,7 @@ from sentences import sentence
 from servers import Answer, Server
 
 from semsig_gis import __version__
-from semsig_gis.database import open_database
+from semsig_gis.database import open_city, open_database
 from semsig_gis.localization import localize
 
 if TYPE_CHECKING:
@@ -336,6 +336,10 @@ def test_demo_shows_an_answer_a_doubt_and_a_command_to_type(
     _, *words = shlex.split(line)
     answer = run_ok("", *words)
     assert " ".join(answer.split()).partition(" with ")[0] in output
+    # The buildings and streets are found, and are layers of the export.
+    run_ok("build demo/objects.parquet --out again.parquet")
+    assert set(open_city("again.parquet").store.ground) == {"buildings", "streets"}
+    assert {"buildings", "streets"} <= set(gpd.list_layers("demo/city.gpkg")["name"])
     page = text("demo/place.html")
     assert "Street " in page
 
