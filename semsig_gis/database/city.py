@@ -37,6 +37,7 @@ from semsig_gis.database.store import (
     names_in,
     open_store,
 )
+from semsig_gis.objects import Loaded, StreetObjects
 from semsig_gis.storage import read_geoparquet, whole_folder, write_geoparquet
 
 if TYPE_CHECKING:
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
     from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.place_names import PlaceNames
     from semsig_gis.database.store import ObjectStore
-    from semsig_gis.objects import StreetObjects
 
 
 ADDED = "added"
@@ -127,9 +127,8 @@ class City(Displayed):
         Of a database in parts, no building or street is read.
         """
         try:
-            if self._in_parts and "store" not in vars(self):
-                return ground_licenses(self.path)
-            return self.store.ground_licenses
+            in_parts = self._in_parts and "store" not in vars(self)
+            return ground_licenses(self.path) if in_parts else self.store.ground_licenses
         except DatabaseError:
             return ()
 
@@ -300,6 +299,11 @@ def whole_database(cells: SignatureDatabase | City | str | Path) -> SignatureDat
         return cells.database
     if isinstance(cells, str | Path):
         return open_database(cells)
+    if isinstance(cells, Loaded | StreetObjects):
+        raise InputError(
+            "street objects were given as the database; give the city that build makes of them, "
+            "or that open_city returns."
+        )
     if not isinstance(cells, SignatureDatabase):
         raise InputError(
             f"a {type(cells).__name__} was given as the database; give a path, a city such as "

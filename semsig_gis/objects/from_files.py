@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from semsig_gis.core import InputError
 from semsig_gis.objects.extent import MAX_DISTORTION
 from semsig_gis.objects.layers import assemble, choose_layers, read_files
 from semsig_gis.objects.skipped_layers import layers_in_same_extracts, read_small_layers
@@ -111,6 +112,8 @@ def load(
     (1, 32631)
     """
     paths = [Path(files)] if isinstance(files, str | Path) else list(map(Path, files))
+    if not paths:
+        raise InputError("no file was given; give one or more.")
     several = [catalog] if isinstance(catalog, str | Path | Catalog) else list(catalog)
     if not several:
         names, lines = detect_catalogs(paths)

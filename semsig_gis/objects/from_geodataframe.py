@@ -139,6 +139,11 @@ def objects_from_frame(
 
 def _require_frame(frame: object) -> None:
     """Raise an error if `frame` is not a GeoDataFrame with geometry and CRS."""
+    if isinstance(frame, str | Path):
+        raise InputError(
+            f"the path {frame} was given; give what open_objects returns for a file of street "
+            "objects, or load for another file."
+        )
     if not isinstance(frame, gpd.GeoDataFrame):
         raise InputError(
             f"a {type(frame).__name__} was given; give a GeoDataFrame, or what load or "

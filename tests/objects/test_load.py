@@ -115,6 +115,8 @@ def test_files_are_loaded_in_one_call(tmp_path: Path) -> None:
     assert set(load(town, layers=["benches"]).objects.codes) == {osm.taxonomy.by_name("bench").code}
     with refused(UnknownNameError, "opnstreetmap"):
         load(town, catalog="opnstreetmap")
+    with refused(InputError, "no file"):
+        load([])
 
 
 def test_coordinate_systems_are_given_as_codes_text_or_values(tmp_path: Path) -> None:
