@@ -76,6 +76,8 @@ PATIENCE_S = 2.0  # a progress bar appears only if the work takes longer
 _AMOUNT = r"[-+±]?(?:\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?|infinite)(?: ?(?:°|%|m|km|km²|m²|MB|s|ms))?"
 NUMBER = re.compile(rf"{_AMOUNT}(?:(?:-| to ){_AMOUNT})?")
 """A number in a table with its unit, or the two ends of an interval."""
+UNIT_SPACE = re.compile(r"(?<=\d) (?=(?:°|%|m|km|km²|m²|MB|s|ms)(?!\w))")
+NO_BREAK = "\N{NO-BREAK SPACE}"
 WIDEST_WORD = 30  # longer words in a column, such as addresses, may be broken
 
 
@@ -101,8 +103,10 @@ def say_sentence(text: str) -> None:
 
 
 def _wrapped(line: str, width: int) -> str:
-    """Return a line with breaks between words."""
-    return textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False)
+    """Return a line with breaks between words, but not between a number and its unit."""
+    kept = UNIT_SPACE.sub(NO_BREAK, line)
+    broken = textwrap.fill(kept, width, break_long_words=False, break_on_hyphens=False)
+    return broken.replace(NO_BREAK, " ")
 
 
 Talk = Literal["quiet", "plain", "verbose"]

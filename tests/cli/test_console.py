@@ -90,6 +90,18 @@ def test_sentences_are_wrapped_between_words_and_commands_are_not(
     )
 
 
+@pytest.mark.parametrize("width", range(20, 60))
+def test_numbers_stay_with_their_units(
+    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    text = "Within 50 m with a chance of 98 %, in 7 cells, 700 m², 16.7 m off, in 12 ms or 3 more."
+    console.say_sentence(text)
+    lines = capsys.readouterr().out.splitlines()
+    assert " ".join(lines) == text
+    assert not any(line.startswith(("m", "%")) and line[:4] != "more" for line in lines)
+
+
 HOSTILE = "a\x1b[2J\x1b]0;title\x07\u009b31m\u202eb\r\ud83d"
 
 
