@@ -104,8 +104,8 @@ def say_sentence(text: str) -> None:
 
 def _wrapped(line: str, width: int) -> str:
     """Return a line with breaks between words, but not between a number and its unit."""
-    kept = UNIT_SPACE.sub(NO_BREAK, line)
-    broken = textwrap.fill(kept, width, break_long_words=False, break_on_hyphens=False)
+    joined = UNIT_SPACE.sub(NO_BREAK, line)
+    broken = textwrap.fill(joined, width, break_long_words=False, break_on_hyphens=False)
     return broken.replace(NO_BREAK, " ")
 
 

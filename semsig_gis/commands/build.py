@@ -162,8 +162,8 @@ class Build:
         from semsig_gis.objects import ground_file, open_objects, read_area
         from semsig_gis.storage import EMPTY_BOX, bounds_by_group
 
-        beside = {role: ground_file(self.objects, role) for role in ROLES}
-        for role, path in beside.items():
+        ground_files = {role: ground_file(self.objects, role) for role in ROLES}
+        for role, path in ground_files.items():
             if os.path.realpath(path) == os.path.realpath(self.out):
                 raise InputError(
                     f"{self.out} is where the {role} of {self.objects} are, so no database can be "
@@ -171,7 +171,7 @@ class Build:
                 )
         defaults = {
             role: path
-            for role, path in beside.items()
+            for role, path in ground_files.items()
             if self.ground and getattr(self, role) is None
         }
         defaults = {role: path for role, path in defaults.items() if path.is_file()}

@@ -247,8 +247,8 @@ def method_index(database: SignatureDatabase, method: LikelihoodMethod) -> Likel
     noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
     # The noise of an index may differ from the one that was asked for, so both are kept.
     indexes: list[tuple[Noise, LikelihoodIndex]] = database.memo
-    for asked, index in indexes:
-        if asked == noise:
+    for indexed_noise, index in indexes:
+        if indexed_noise == noise:
             return index
     index = build_index(database, noise)
     indexes[:] = [*indexes[1 - KEPT_INDEXES :], (noise, index)]

@@ -109,17 +109,19 @@ def test_objects_without_direction_are_explained() -> None:
     codes = QUERY.codes.tolist()
     # The objects of the last class have no direction, and one more of it is said than is there.
     *_, last = codes
-    kept = [number for number, code in enumerate(codes) if code != last]
+    others = [number for number, code in enumerate(codes) if code != last]
     title = CITY.taxonomy.words([last])
     pairs = [
         (CITY.taxonomy.by_code(codes[number]).name, float(QUERY.bearings[number]))
-        for number in kept
+        for number in others
     ]
     count = codes.count(last)
     absent = next(code for code in CITY.present_codes.tolist() if code not in codes)
     none = f"no {CITY.taxonomy.words([absent])}"
-    said = ", ".join([*(f"{name} at {at:.0f}" for name, at in pairs), *[title] * (count + 1), none])
-    answer = localize(CITY, said)
+    sentence = ", ".join(
+        [*(f"{name} at {at:.0f}" for name, at in pairs), *[title] * (count + 1), none]
+    )
+    answer = localize(CITY, sentence)
     assert answer.unplaced == (last,) * (count + 1)
     table = answer.explain().set_index("you said")
     here = answer.posterior.database.select([answer.columns["cell"][0]])

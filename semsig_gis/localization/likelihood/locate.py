@@ -267,15 +267,15 @@ class Location(Answer):
         undirected, rest = self.without_direction(self.explanations[0])
         rows = []
         for number, row in enumerate(self.explanations[0].to_dict(self.north)["rows"]):
-            said = described(row["query_class"], row["query_bearing"], row["query_range"])
+            view_part = described(row["query_class"], row["query_bearing"], row["query_range"])
             verdict = row["verdict"]
             if number in undirected:
-                said, verdict = described(row["object_class"], None, None), "matched"
+                view_part, verdict = described(row["object_class"], None, None), "matched"
             there = described(row["object_class"], row["object_bearing"], row["distance"])
-            rows.append((said, there, IN_WORDS[verdict], round(row["chance"], 2)))
+            rows.append((view_part, there, IN_WORDS[verdict], round(row["chance"], 2)))
         rows += [
-            (said, there, IN_WORDS["matched" if there else "false"], math.nan)
-            for said, there in rest
+            (view_part, there, IN_WORDS["matched" if there else "false"], math.nan)
+            for view_part, there in rest
         ]
         return pd.DataFrame(rows, columns=["you said", "is there", "verdict", "chance"])
 
@@ -292,18 +292,18 @@ class Location(Answer):
             for number, row in enumerate(explanation.rows)
             if row["verdict"] == "missed"
         }
-        found = set()
+        numbers = set()
         for number in sorted(missed, key=lambda number: explanation.rows[number]["distance"]):
             if left[missed[number]]:
                 left[missed[number]] -= 1
-                found.add(number)
-        more = Counter(code for number, code in missed.items() if number not in found)
+                numbers.add(number)
+        more = Counter(code for number, code in missed.items() if number not in numbers)
         rest = [(words([code] * count), "") for code, count in left.items() if count]
         rest += [
             (f"no {words([code])}", words([code] * more[code]) if more[code] else "")
             for code in self.absent
         ]
-        return found, rest
+        return numbers, rest
 
     @property
     def chances(self) -> NDArray[np.float64]:

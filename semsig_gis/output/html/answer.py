@@ -218,7 +218,7 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
     visible = database.codes[slice(*database.offsets[candidate["cell"] :][:2])]
     there = "none on this map" if rays else words(visible)
     more = [[words(rest), there]] if rest else []
-    more += [[said, found or "none in sight"] for said, found in others]
+    more += [[phrase, place or "none in sight"] for phrase, place in others]
     lat, lon = candidate["rays"][0]["from"] if candidate["rays"] else candidate["place"]
     best = exact_latlon(location.xy, location.crs)[0] if rank == 1 else [lat, lon]
     sure = location.answer.given

@@ -328,9 +328,9 @@ def _explanation_table(rank: int, explanation: Explanation, answer: Location) ->
     for number in undirected:
         rows[number] |= {"verdict": NO_DIRECTION, "query_class": rows[number]["object_class"]}
     verdicts = [*VERDICTS, *([NO_DIRECTION] if undirected else [])]
-    found = Counter(row["verdict"] for row in rows)
-    outside = len(rows) - sum(found[verdict] for verdict in verdicts)
-    texts = [f"{found[verdict]} {verdict}" for verdict in verdicts]
+    counts = Counter(row["verdict"] for row in rows)
+    outside = len(rows) - sum(counts[verdict] for verdict in verdicts)
+    texts = [f"{counts[verdict]} {verdict}" for verdict in verdicts]
     summary = ", ".join(texts) + (f"; {outside} outside the photos" if outside else "")
     lon, lat = to_degrees(answer.crs).transform(*explanation.xy)
     title = f"Place {rank}, {lat:.6f}, {lon:.6f} (lat, lon): {summary}."
