@@ -106,6 +106,8 @@ def test_absent_and_undirected_objects_are_used() -> None:
 
 
 def test_objects_without_direction_are_explained() -> None:
+    assert QUERY.codes is not None
+    assert QUERY.bearings is not None
     codes = QUERY.codes.tolist()
     # The objects of the last class have no direction, and one more of it is said than is there.
     *_, last = codes
@@ -124,7 +126,7 @@ def test_objects_without_direction_are_explained() -> None:
     answer = localize(CITY, sentence)
     assert answer.unplaced == (last,) * (count + 1)
     table = answer.explain().set_index("you said")
-    here = answer.posterior.database.select([answer.columns["cell"][0]])
+    here = answer.posterior.database.select(answer.columns["cell"][:1])
     standing = here.codes.tolist().count(last)
     there = table.loc[[title], "verdict"].tolist()
     assert there.count("is there") == min(standing, count + 1)
