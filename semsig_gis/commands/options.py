@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from semsig_gis.observation import North, View
 
 EXPLAINED = 3  # candidates
-MARGIN_M = 100.0  # of the ground of a map around the cells
 MOST_TOP = 10_000
 # The same limits as in `core` and the specs, which are slow to import.
 MOST_SEED, MOST_METRES, MOST_WORKERS, MOST_QUERIES = 10**18, 1_000_000, 1024, 10_000_000
@@ -725,6 +724,7 @@ def draw_ground(
     map_: folium.Map, city: City, *, buildings: Path | None = None, streets: Path | None = None
 ) -> None:
     """Add streets and buildings to a map, from files or else from the object store."""
+    from semsig_gis.database import ground_box
     from semsig_gis.objects import read_surroundings
     from semsig_gis.output import ground_map
 
@@ -737,10 +737,8 @@ def draw_ground(
         lines = stored.get("streets") if lines is None else lines
     if houses is None and lines is None:
         return
-    xy = city.database.xy
-    low, high = xy.min(axis=0) - MARGIN_M, xy.max(axis=0) + MARGIN_M
+    box = ground_box(city.database.xy)
     try:
-        box = (*low.tolist(), *high.tolist())
         ground_map(buildings=houses, streets=lines, box=box, map_=map_)
     except EmptyResultError:
         if buildings is not None or streets is not None:

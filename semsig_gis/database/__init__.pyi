@@ -46,6 +46,7 @@ from .sightings import clockwise_order as clockwise_order
 from .sightings import visible_objects_at as visible_objects_at
 from .store import ObjectStore as ObjectStore
 from .store import built_digest as built_digest
+from .store import ground_box as ground_box
 from .store import open_store as open_store
 from .store import save_with_store as save_with_store
 from .store import store_path as store_path

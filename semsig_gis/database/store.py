@@ -155,8 +155,7 @@ class ObjectStore(Displayed):
 
     def ground_around(self, xy: NDArray[np.float64]) -> dict[str, Any]:
         """Return the arguments of `ground_map` around places, (n, 2); empty without any ground."""
-        low, high = xy.min(axis=0) - GROUND_M, xy.max(axis=0) + GROUND_M
-        box = (*low.tolist(), *high.tolist())
+        box = ground_box(xy)
         tables = {
             name: table
             for name, table in self.ground.items()
@@ -196,6 +195,12 @@ class ObjectStore(Displayed):
         if self.footprints is None or occlusion is None:
             return None
         return self._buildings.around(places, distance=distance)
+
+
+def ground_box(xy: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """Return the box of the streets and buildings that are drawn around places, shape (n, 2)."""
+    low, high = xy.min(axis=0) - GROUND_M, xy.max(axis=0) + GROUND_M
+    return (*low.tolist(), *high.tolist())
 
 
 def _stored(table: gpd.GeoDataFrame, crs: CRS, *names: str) -> gpd.GeoDataFrame:

@@ -298,10 +298,14 @@ def test_view_is_given_without_an_option(city: Path, run: Run) -> None:
     # People leave out objects in a sentence, so the default noise is another one.
     assert json.loads(run(*query, ", ".join(words))[1])["noise"] == "by-hand"
     # The last object has no direction.
-    code, out, _ = run("localize", city, ", ".join([*words[:-1], names[-1]]))
+    line = ", ".join([*words[:-1], names[-1]])
+    code, out, _ = run("localize", city, line)
     assert code == 0
     title = CITY.taxonomy.by_symbol(VIEW["types"][-1]).title.lower()
     assert f"Seen somewhere: {title}." in out
+    assert "said without direction" in run("localize", city, line, "--explain")[1]
+    _, out, _ = run("localize", city, f"{line}, {names[-1]}")
+    assert f"Seen somewhere: 2 × {title}." in out
     # Absent classes, in addition to symbols.
     code, out, _ = run("localize", city, "no bench", *options(VIEW))
     assert (code, "Not there: bench." in out) == (0, True)

@@ -133,6 +133,9 @@ def test_objects_without_direction_are_explained() -> None:
     assert table.loc[none, "verdict"] in {"is not there", "is there"}
     undirected, _ = answer.without_direction(answer.explanations[0])
     assert len(undirected) == min(standing, count + 1)
+    page = semsig_gis.location_map(answer).get_root().render()
+    assert page.count('"no direction"') == len(undirected)
+    assert none in page
 
 
 def test_answer_says_where_and_why(tmp_path: Path) -> None:

@@ -82,6 +82,7 @@ def test_city_request_returns_facts_about_the_city(page: Page) -> None:
     assert city["noise"][0] == "by-hand"
     assert set(city["noise"]) == set(NOISES)
     assert any(line.startswith("Town") for line in city["licences"])
+    assert city["licences"] == list(page.bench.city.licenses)
     assert city["image"]["url"].startswith("data:image/png;base64,")
     codes = [item["code"] for item in city["classes"]]
     assert sorted(codes) == database.present_codes.tolist()
