@@ -88,6 +88,13 @@ def is_local(address: object) -> bool:
 
 
 @pytest.fixture(autouse=True, scope="session")
+def _no_terminal() -> None:
+    """Remove the size of a terminal from the environment, which Python's readline puts there."""
+    for name in ("COLUMNS", "LINES"):
+        os.environ.pop(name, None)
+
+
+@pytest.fixture(autouse=True, scope="session")
 def _no_network() -> Iterator[None]:
     """Refuse every connection and name look-up that would leave the machine."""
 

@@ -285,7 +285,7 @@ def test_other_extracts(geodata: Path, file: str, counts: dict[str, int]) -> Non
 
 def test_no_tags_and_no_users_are_kept(geodata: Path) -> None:
     for layer in read_extract(geodata, "neukölln").values():
-        more = ["half_width", "name"] if layer.spec.role == "streets" else []
+        more = {"streets": ["half_width", "name"], "buildings": ["name"]}.get(layer.spec.role, [])
         assert layer.table.columns.tolist() == ["class_name", "source_id", *more, "geometry"]
         assert layer.table.source_id.str.fullmatch(r"(node|way|relation)/\d+").all()
 

@@ -217,5 +217,5 @@ def test_unusable_query_is_refused(
 @pytest.mark.parametrize("types", ["DZ", "d", "D D", "DD\n", "D,D", "É"])
 def test_error_names_an_unknown_symbol(types: str) -> None:
     unknown = next(symbol for symbol in types if symbol != "D")
-    with refused(UnknownNameError, f"symbol {unknown!r}", "D street light"):
+    with refused(UnknownNameError, f"symbol {unknown!r}", "semsig info --symbols"):
         parsed(types)
