@@ -110,7 +110,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_recipes_give_the_view_of_the_photograph(command: str, run: Run) -> None:
     code, out, err = run(command.replace(" --database city.parquet", ""))
     assert code == 0, err
-    assert out.startswith("views.jsonl: 1 view of 1 picture with 2 objects"), out
+    assert out.startswith("1 view of 1 picture with 2 objects"), out
     (line,) = read_queries("views.jsonl", taxonomy=TAXONOMY)
     assert isinstance(line.query, View)
     assert line.query.bearings is not None

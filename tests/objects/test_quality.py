@@ -56,8 +56,8 @@ def test_objects_of_each_class_are_counted() -> None:
     )
     # Five squares of a hectare each, whatever their classes.
     assert [dataclasses.astuple(item) for item in report.classes] == [
-        pytest.approx(("bench", 4, 5, 4.0, 80.0, 1000.0)),
-        pytest.approx(("bus_stop", 1, 1, 1.0, 20.0, None)),
+        pytest.approx(("bench", "Bench", 4, 5, 4.0, 80.0, 1000.0)),
+        pytest.approx(("bus_stop", "Bus stop", 1, 1, 1.0, 20.0, None)),
     ]
     assert report.objects == 5
     assert (report.hull_km2, report.occupied_km2) == pytest.approx((1.0, 0.05))

@@ -235,7 +235,7 @@ def draw_scene(scene: Scene) -> Picture:
     Examples
     --------
     >>> draw_scene(cell_scene(demo_database, 0, title="A corner")).description
-    'A corner. Signature DB, seen from 2.997619, 48.751799: tree (1), street light (1).'
+    'A corner. Seen from 48.751799, 2.997619: street light, tree.'
     """
     return draw_scenes([scene])
 
@@ -261,7 +261,7 @@ def draw_scenes(scenes: Sequence[Scene]) -> Picture:
     Examples
     --------
     >>> here, there = (cell_scene(demo_database, cell) for cell in (0, 9))
-    >>> draw_scenes([here, there]).description.count("Signature")
+    >>> draw_scenes([here, there]).description.count("Seen from")
     2
     """
     if not scenes:
