@@ -41,6 +41,7 @@ from semsig_gis.storage import (
     add_footer_checksum,
     hilbert_order,
     parse_json,
+    require_regular,
     whole_file,
 )
 
@@ -205,9 +206,15 @@ def save_ground(
 def _is_ground(path: Path) -> bool:
     """Whether a file was written by `save_ground`."""
     try:
-        return GROUND in parse_json((pq.read_schema(path).metadata or {})[b"PANDAS_ATTRS"])
+        return GROUND in _metadata(path, b"PANDAS_ATTRS")
     except (pa.ArrowException, OSError, LookupError, TypeError, ValueError):
         return False
+
+
+def _metadata(path: str | Path, key: bytes) -> Any:  # noqa: ANN401 - any value of JSON
+    """Return the JSON under a key of the metadata of a Parquet file."""
+    require_regular(path)
+    return parse_json((pq.read_schema(path).metadata or {})[key])
 
 
 def covers_place(path: str | Path, *, crs: CRS, box: Sequence[float]) -> bool:
@@ -216,7 +223,7 @@ def covers_place(path: str | Path, *, crs: CRS, box: Sequence[float]) -> bool:
     Only its metadata is read; one that cannot be read may have some.
     """
     try:
-        geo = parse_json((pq.read_schema(path).metadata or {})[b"geo"])
+        geo = _metadata(path, b"geo")
         column = geo["columns"][geo["primary_column"]]
         own = CRS.from_user_input(column["crs"])
         to_box = Transformer.from_crs(own, crs, always_xy=True)

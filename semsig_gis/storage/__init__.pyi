@@ -41,6 +41,7 @@ from .text import MAX_TEXT_BYTES as MAX_TEXT_BYTES
 from .text import parse_json as parse_json
 from .text import read_text as read_text
 from .text import read_whole as read_whole
+from .text import require_regular as require_regular
 from .toml import parse_toml as parse_toml
 from .toml import read_values as read_values
 from .toml import toml_text as toml_text
