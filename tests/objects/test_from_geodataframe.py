@@ -216,7 +216,7 @@ def test_tables_with_unclear_contents_are_refused() -> None:
         build_database(tagged)
     with refused(InputError, "kind", "class_column"):
         build_database(points(kind=["bench"]))
-    with refused(InputError, "GeoDataFrame"):
+    with refused(InputError, "city.parquet", "open_objects"):
         build_database("city.parquet")
     with refused(InputError, "one"):
         objects_from_frame(tagged, tags=True, class_column="amenity")

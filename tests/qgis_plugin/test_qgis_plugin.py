@@ -410,7 +410,8 @@ def test_other_tools_write_their_outputs(session: dict[str, Any]) -> None:
     assert "cells" in others["info"]
     assert "│" not in others["info"]
     assert set(others["groups"][commands()["demo"].title]) == {
-        *("Queries", "From the true to the best place", "Street objects", "Signature cells")
+        *("Queries", "From the true to the best place", "Street objects", "Signature cells"),
+        *("Streets", "Buildings"),
     }
 
 
