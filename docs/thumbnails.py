@@ -17,7 +17,7 @@ from selenium import webdriver
 DOCS = Path(__file__).resolve().parent
 GALLERY, THUMBNAILS = DOCS / "_build/html/gallery", DOCS / "images/gallery"
 SIZE, WIDTH = (900, 600), 450
-QUALITY = 72
+QUALITY = 64
 SETTLED_S = 4.0  # until all animations have ended
 
 
