@@ -204,8 +204,8 @@ class Demo:
         from semsig_gis.output import evaluation_headline, place_sentences
 
         yield (
-            f"A made-up town: {len(city.store.objects):,} street objects, seen from "
-            f"{len(city.database):,} cells along its streets, past its buildings."
+            f"A made-up town: {len(city.store.objects):,} street objects between buildings, "
+            f"{len(city.database):,} cells of 10 m along its streets."
         )
         for example in examples:
             place = f" {example.place}" if example.place else ""
