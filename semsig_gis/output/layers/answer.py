@@ -26,7 +26,16 @@ if TYPE_CHECKING:
     from semsig_gis.localization import Answer, Explanation, SearchRegions
     from semsig_gis.output.layers.model import Layer
 
-PLACE_FORM = form_of("""
+LINKS = """
+[Links]
+openstreetmap = ["OpenStreetMap", "Address of a map of the place."]
+google_street_view = ["Google Street View", "Address of photographs near the place."]
+mapillary = ["Mapillary", "Address of photographs near the place."]
+panoramax = ["Panoramax", "Address of photographs near the place."]
+kartaview = ["KartaView", "Address of photographs near the place."]
+"""
+PLACE_FORM = form_of(
+    """
 [Place]
 address = ["Place", "In words, by the streets and buildings around it."]
 answer = ["Answer", "Given, or withheld where the chance is too small."]
@@ -46,14 +55,11 @@ heading = ["Heading", "What is added to the bearings of the query to have them f
 heading_sigma = ["Standard deviation of the heading", "Of the heading.", "°", 1]
 cell_id = ["Cell", "Number of the cell in the grid."]
 refined = ["Off the grid", "Whether the place was looked for between the viewpoints, too."]
-[Links]
-openstreetmap = ["OpenStreetMap", "Address of a map of the place."]
-google_street_view = ["Google Street View", "Address of photographs near the place."]
-mapillary = ["Mapillary", "Address of photographs near the place."]
-panoramax = ["Panoramax", "Address of photographs near the place."]
-kartaview = ["KartaView", "Address of photographs near the place."]
-""")  # noqa: E501
-CANDIDATE_FORM = form_of("""
+"""  # noqa: E501
+    + LINKS
+)
+CANDIDATE_FORM = form_of(
+    """
 [Place]
 address = ["Place", "In words, by the streets and buildings around it."]
 rank = ["Rank", "1 is the best place for the query."]
@@ -74,13 +80,9 @@ length = ["Objects seen", "How many street objects are seen from the cell."]
 types = ["Types", "Symbols of the objects, clockwise from north."]
 bearings = ["Bearings", "Of the same objects, clockwise from grid north.", "°"]
 distances = ["Distances", "Of the same objects.", "m"]
-[Links]
-openstreetmap = ["OpenStreetMap", "Address of a map of the place."]
-google_street_view = ["Google Street View", "Address of photographs near the place."]
-mapillary = ["Mapillary", "Address of photographs near the place."]
-panoramax = ["Panoramax", "Address of photographs near the place."]
-kartaview = ["KartaView", "Address of photographs near the place."]
-""")  # noqa: E501
+"""  # noqa: E501
+    + LINKS
+)
 REGION_FORM = form_of("""
 [Region]
 rank = ["Rank", "1 is the region to be searched first."]
