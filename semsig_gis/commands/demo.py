@@ -130,7 +130,6 @@ class Demo:
         layers = synthetic_city(spec)
         objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
         houses, streets = (layer.table for layer in synthetic_surroundings(spec))
-        streets = streets.assign(name=[f"Street {number}" for number in streets["source_id"]])
         objects_file = self.out / "objects.parquet"
         save_ground(objects_file, buildings=houses, streets=streets, remark=reporter.remark)
         save_objects(objects, objects_file)
@@ -178,11 +177,12 @@ class Demo:
         """Write the maps and the report; return their files and notes on them."""
         from semsig_gis.output import city_map, location_map, save_map
 
-        files = {"answer on a map": self.out / "place.html"} if examples else {}
-        for path in files.values():
+        files = {}
+        if examples:
+            files["answer on a map"] = self.out / "place.html"
             page = location_map(examples[0].answer)
             draw_ground(page, city)
-            save_map(page, path, title="A made-up town")
+            save_map(page, files["answer on a map"], title="A made-up town")
         files["errors on a map"] = self.out / "map.html"
         page = city_map(city.database, evaluation=evaluation, objects=city.objects)
         draw_ground(page, city)
