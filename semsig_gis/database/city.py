@@ -37,7 +37,6 @@ from semsig_gis.database.store import (
     names_in,
     open_store,
 )
-from semsig_gis.objects import Loaded, StreetObjects
 from semsig_gis.storage import read_geoparquet, whole_folder, write_geoparquet
 
 if TYPE_CHECKING:
@@ -51,6 +50,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.place_names import PlaceNames
     from semsig_gis.database.store import ObjectStore
+    from semsig_gis.objects import StreetObjects
 
 
 ADDED = "added"
@@ -299,15 +299,10 @@ def whole_database(cells: SignatureDatabase | City | str | Path) -> SignatureDat
         return cells.database
     if isinstance(cells, str | Path):
         return open_database(cells)
-    if isinstance(cells, Loaded | StreetObjects):
-        raise InputError(
-            "street objects were given as the database; give the city that build makes of them, "
-            "or that open_city returns."
-        )
     if not isinstance(cells, SignatureDatabase):
         raise InputError(
             f"a {type(cells).__name__} was given as the database; give a path, a city such as "
-            "build and open_city return, or a signature database."
+            "build makes of street objects or open_city returns, or a signature database."
         )
     return cells
 
