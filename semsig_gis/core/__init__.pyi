@@ -26,8 +26,10 @@ from .geometry import CLASS_NAME as CLASS_NAME
 from .geometry import COUNT as COUNT
 from .geometry import FULL_TURN as FULL_TURN
 from .geometry import GEOMETRY as GEOMETRY
+from .geometry import GROUP as GROUP
 from .geometry import HALF_TURN as HALF_TURN
 from .geometry import HALF_WIDTH as HALF_WIDTH
+from .geometry import HEIGHT as HEIGHT
 from .geometry import LICENSES as LICENSES
 from .geometry import MERGED as MERGED
 from .geometry import NAME as NAME
@@ -35,6 +37,7 @@ from .geometry import NOTES as NOTES
 from .geometry import ROW_SPAN as ROW_SPAN
 from .geometry import SOURCE as SOURCE
 from .geometry import SOURCE_ID as SOURCE_ID
+from .geometry import TEXTS as TEXTS
 from .geometry import AnyCrs as AnyCrs
 from .geometry import Bounds as Bounds
 from .geometry import Distortion as Distortion

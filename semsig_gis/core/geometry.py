@@ -53,6 +53,12 @@ MERGED = "merged"
 GEOMETRY = "geometry"
 HALF_WIDTH = "half_width"
 NAME = "name"
+GROUP = "group"
+"""Number of the extended thing that a point belongs to, -1 for an object that is a point."""
+HEIGHT = "height"
+"""Metres from the ground to the top, NaN if unknown."""
+TEXTS = (NAME, "brand", "operator", "ref", "house_number", "street")
+"""Columns of what is written on objects, empty where nothing is."""
 
 NOTES = "notes"
 """Key of the warnings in the metadata of a file."""

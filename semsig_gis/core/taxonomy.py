@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import functools
 import itertools
-from dataclasses import asdict, dataclass, field, replace
+import re
+from dataclasses import asdict, dataclass, field, fields, replace
 from string import ascii_letters, digits
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import CatalogError, UnknownNameError, nearest_name
-from semsig_gis.core.inputs import check_fields, matching, metres, number
+from semsig_gis.core.inputs import (
+    Flag,  # noqa: TC001 - of fields
+    check_fields,
+    matching,
+    metres,
+    number,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -20,8 +27,14 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 MAX_CODE = 255
-OWN_CODES = 200
-"""First code of the classes that a user names."""
+OWN_CODES = 224
+"""First code of the classes that a user names; those of built-in catalogues are below."""
+LETTERS = (
+    "\u00c0-\u00d6\u00d8-\u00f6\u00f8-\u024f"  # Latin
+    "\u0391-\u03a1\u03a3-\u03a9\u03b1-\u03c9\u0410-\u044f"  # Greek and Cyrillic
+)
+"""Letters beyond ASCII that may be symbols, two bytes in UTF-8."""
+Shape = Literal["point", "line", "area"]
 WILDCARD = 0
 """Code of an object of unknown class."""
 MAX_RANGE_M = 6000.0
@@ -39,7 +52,7 @@ class ObjectClass:
     code : int
         Stable number, 1 to 255.
     symbol : str
-        ASCII letter or digit of the class in a type sequence.
+        Letter (Latin, Greek or Cyrillic) or digit of the class in a type sequence.
     name : str
         Lower-case identifier such as ``street_light``.
     title : str
@@ -49,6 +62,14 @@ class ObjectClass:
     height_m, height_sigma : float, optional
         Mean and standard deviation of the height of an object above the ground, in metres; None if
         the distance cannot be estimated from the height.
+    family : str, optional
+        Lower-case identifier of classes that are confused more easily with each other than with
+        others, such as ``shop``; empty if it has none.
+    shape : {"point", "line", "area"}
+        Whether its objects are points, or extended things of which a viewpoint sees the nearest
+        visible point.
+    tall : bool, default False
+        Whether its objects are landmarks, seen over roofs up to `range_m`.
 
     Raises
     ------
@@ -63,12 +84,17 @@ class ObjectClass:
     """
 
     code: Annotated[int, number("a whole number from 1 to 255", 1, MAX_CODE, whole=True)]
-    symbol: Annotated[str, matching("[A-Za-z0-9]", "one ASCII letter or digit")]
+    symbol: Annotated[str, matching(f"[A-Za-z0-9{LETTERS}]", "one letter or digit")]
     name: Annotated[str, matching("[a-z][a-z0-9_]*", "lower-case letters, digits and underscores")]
     title: str = field(compare=False)
     range_m: Annotated[float, metres(MAX_RANGE_M)] | None = None
     height_m: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
     height_sigma: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
+    family: Annotated[
+        str, matching("[a-z][a-z0-9_]*|", "lower-case letters, digits and underscores")
+    ] = field(default="", compare=False)
+    shape: Shape = field(default="point", compare=False)
+    tall: Flag = False
 
     def __post_init__(self) -> None:  # noqa: D105
         check_fields(self, f"class {self.name!r}", error=CatalogError)
@@ -138,21 +164,22 @@ class Taxonomy(Displayed):
         return cls(tuple(ObjectClass(**item) for item in items))
 
     def to_list(self) -> list[dict[str, Any]]:
-        """Return the classes as plain mappings for JSON, without fields that are None."""
+        """Return the classes as plain mappings for JSON, without fields that have their default."""
+        defaults = {item.name: item.default for item in fields(ObjectClass)}
         return [
-            {key: value for key, value in asdict(item).items() if value is not None}
+            {key: value for key, value in asdict(item).items() if value != defaults[key]}
             for item in self.classes
         ]
 
     def extended(self, classes: Iterable[ObjectClass | str]) -> Taxonomy:
         """Return a taxonomy with further classes; their codes, symbols and names must be new.
 
-        A class that is only a name, such as ``"statue"``, gets a code from 200 and a free symbol.
+        A class that is only a name, such as ``"statue"``, gets a code from 224 and a free symbol.
 
         >>> from semsig_gis import paper_taxonomy
         >>> statue = paper_taxonomy().extended(["statue"]).by_name("statue")
         >>> statue.code, statue.symbol, statue.title
-        (200, 's', 'Statue')
+        (224, 's', 'Statue')
         """
         taxonomy = self
         for item in classes:
@@ -165,8 +192,11 @@ class Taxonomy(Displayed):
         codes = {item.code for item in self.classes}
         symbols = {item.symbol for item in self.classes}
         code = next((code for code in range(OWN_CODES, MAX_CODE + 1) if code not in codes), None)
-        letters = (sign for sign in name + ascii_letters + digits if sign in ascii_letters + digits)
-        symbol = next((letter for letter in letters if letter not in symbols), None)
+        plain = ascii_letters + digits
+        more = "".join(map(chr, range(0xC0, 0x450)))
+        letters = (sign for sign in name if sign in plain), plain, re.findall(f"[{LETTERS}]", more)
+        free = (sign for sign in itertools.chain(*letters) if sign not in symbols)
+        symbol = next(free, None)
         if code is None or symbol is None:
             raise CatalogError(
                 f"class {name!r} cannot be added, because the codes from {OWN_CODES} or the "
@@ -240,7 +270,8 @@ class Taxonomy(Displayed):
 
     def decode(self, codes: ArrayLike) -> str:
         """Return the symbols of class codes, shape (n,), the inverse of `encode`."""
-        return self.symbol_bytes[np.asarray(codes, dtype=np.uint8)].tobytes().decode("ascii")
+        points = self.symbol_points[np.asarray(codes, dtype=np.uint8)]
+        return points.tobytes().decode("utf-32-le")
 
     def words(self, codes: ArrayLike) -> str:
         """Return the titles of class codes, shape (n,), for people.
@@ -260,12 +291,37 @@ class Taxonomy(Displayed):
             parts.append(title if count == 1 else f"{count} × {title}")
         return ", ".join(parts) or "nothing"
 
+    def family_codes(self, family: str) -> NDArray[np.uint8]:
+        """Return the class codes of a family, ascending; UnknownNameError if no class is in it.
+
+        >>> from semsig_gis import load_catalog
+        >>> 10 in load_catalog("openstreetmap").taxonomy.family_codes("furniture")
+        True
+        """
+        codes = sorted(item.code for item in self.classes if item.family == family != "")
+        if not codes:
+            names = list(dict.fromkeys(item.family for item in self.classes if item.family))
+            raise UnknownNameError(
+                f"family {family!r} is unknown{nearest_name(family, names)}; the families are "
+                f"{', '.join(names) or 'none'}."
+            )
+        return np.array(codes, dtype=np.uint8)
+
+    @functools.cached_property
+    def symbol_points(self) -> NDArray[np.uint32]:
+        """Unicode code points of the symbols of all codes, shape (256,); ``?`` for unused codes."""
+        table = np.full(MAX_CODE + 1, ord("?"), dtype="<u4")
+        for item in self.classes:
+            table[item.code] = ord(item.symbol)
+        table.setflags(write=False)
+        return table
+
     @functools.cached_property
     def symbol_bytes(self) -> NDArray[np.uint8]:
         """ASCII values of the symbols of all codes, shape (256,); ``?`` for unused codes."""
         table = np.full(MAX_CODE + 1, ord("?"), dtype=np.uint8)
         for item in self.classes:
-            table[item.code] = ord(item.symbol)
+            table[item.code] = ord(item.symbol if item.symbol.isascii() else "?")
         table.setflags(write=False)
         return table
 
