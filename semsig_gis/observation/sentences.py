@@ -37,9 +37,12 @@ if TYPE_CHECKING:
     from semsig_gis.observation.spoken import Codes
     from semsig_gis.storage import Row
 
-SEEN = ("types", "bearings", "detections", "see", "photos")
-"""Keys of a row that describe the observed objects; at least one is required."""
-COLUMNS = ("types", "bearings", "bearing_errors", "ranges", "range_errors", "scores", "photo")
+SEEN = ("types", "bearings", "detections", "see", "photos", "signs")
+"""Keys of a row that describe what was seen; at least one is required."""
+COLUMNS = (
+    *("types", "bearings", "bearing_errors", "ranges", "range_errors", "scores", "texts"),
+    "photo",
+)
 LOOK = ("heading", "fov", "sectors", "heading_error")
 """Keys of a row that describe the direction of a photo."""
 
@@ -244,6 +247,8 @@ def _columns_view(values: Row, taxonomy: Taxonomy, radius: float) -> View:
         bearing_errors=_errors(values, "bearing_errors", len(plain)),
         scores=scores,
         photo=np.array(owners, np.int64) if "photo" in values else None,
+        texts=_texts(values, "texts") if "texts" in values else None,
+        signs=_texts(values, "signs"),
         photos=tuple(photos),
     ).turned(0.0)
 
@@ -321,6 +326,14 @@ def _ranges(
         None if np.isnan(ranges).all() else ranges,
         None if np.isnan(errors).all() else errors,
     )
+
+
+def _texts(values: Row, name: str) -> tuple[str, ...]:
+    """Return what was read, as text; a number is text as well, and None is nothing."""
+    items = values.get(name, [])
+    if not isinstance(items, list) or any(isinstance(item, (list, dict)) for item in items):
+        raise InputError(f"{name} were given as {items!r:.60}; give a list of text.")
+    return tuple("" if item is None else str(item) for item in items)
 
 
 def _errors(values: Row, name: str, size: int) -> NDArray[np.float64] | None:

@@ -26,7 +26,7 @@ from semsig_gis.core import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -57,6 +57,8 @@ class ViewRecord(SignatureRecord, PhotoRecord):
     range_errors: NotRequired[list[float | None]]
     bearing_errors: NotRequired[list[float | None]]
     scores: NotRequired[list[dict[str, float]]]
+    texts: NotRequired[list[str]]
+    signs: NotRequired[list[str]]
     photos: NotRequired[list[PhotoRecord]]
     photo: NotRequired[list[int]]
 
@@ -205,6 +207,11 @@ class View(Signature):
         Code 0 is for any class.
     photo : ndarray of int64, shape (n,), or None
         Number of the photo of each object; 0 by default.
+    texts : tuple of str, or None
+        What was read on each object, such as the name of a shop or a house number; empty for none.
+        Distances ignore it.
+    signs : tuple of str, default ()
+        What was read in an unknown direction, such as the name of a street. Distances ignore it.
     photos : tuple of Photo, default one full turn
         The photos, each with its own error of north.
     notes : tuple of str, optional
@@ -228,6 +235,8 @@ class View(Signature):
     bearing_errors: NDArray[np.float64] | None = None
     scores: NDArray[np.float64] | None = None
     photo: NDArray[np.int64] | None = None
+    texts: tuple[str, ...] | None = None
+    signs: tuple[str, ...] = ()
     photos: tuple[Photo, ...] = (FULL_VIEW,)
     notes: tuple[str, ...] = ()
 
@@ -239,10 +248,12 @@ class View(Signature):
                 kind = np.int64 if name == "photo" else np.float64
                 object.__setattr__(self, name, np.asarray(value, dtype=kind))
         self._check()
+        self._set_texts()
 
     def _facts(self) -> dict[str, object]:
         sectors = ", ".join(f"{photo.width:g}°" for photo in self.photos)
-        details = [name for name in ("ranges", "scores") if getattr(self, name) is not None]
+        names = "ranges", "scores", "texts"
+        details = [name for name in names if getattr(self, name) is not None]
         return {**super()._facts(), "sectors": sectors, "details": ", ".join(details) or "none"}
 
     def _check(self) -> None:
@@ -293,6 +304,19 @@ class View(Signature):
                 f"an object is from a photo that is not there; the view has {len(self.photos)}."
             )
 
+    def _set_texts(self) -> None:
+        """Set texts with single blanks; InputError if they do not fit."""
+        if self.texts is not None:
+            texts = _read_texts("texts", self.texts)
+            if len(texts) != len(self):
+                raise InputError(
+                    f"{len(texts)} texts were given for {len(self)} objects; give one for each, "
+                    "empty where nothing was read."
+                )
+            object.__setattr__(self, "texts", texts if any(texts) else None)
+        signs = _read_texts("signs", self.signs)
+        object.__setattr__(self, "signs", tuple(filter(None, signs)))
+
     @classmethod
     def of(cls, signature: Signature, **more: Any) -> View:  # noqa: ANN401 - any fields
         """Return a signature as a view, with fields replaced by `more`."""
@@ -316,6 +340,7 @@ class View(Signature):
             ]
             return np.concatenate(filled)
 
+        read = any(part.texts is not None for part in parts)
         scored = any(part.scores is not None for part in parts)
         shares = [part.class_scores() for part in parts] if scored else []
         rows = [part.photo_rows + first for part, first in zip(parts, first_photos, strict=False)]
@@ -327,6 +352,8 @@ class View(Signature):
             bearing_errors=column("bearing_errors", math.nan),
             scores=np.concatenate(shares) if scored else None,
             photo=np.concatenate(rows),
+            texts=tuple(text for part in parts for text in part.text_rows) if read else None,
+            signs=tuple(sign for part in parts for sign in part.signs),
             photos=tuple(photo for part in parts for photo in part.photos),
             notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
         )
@@ -336,13 +363,23 @@ class View(Signature):
         """Number of the photo of each object, shape (n,)."""
         return np.zeros(len(self), np.int64) if self.photo is None else self.photo
 
+    @property
+    def text_rows(self) -> tuple[str, ...]:
+        """What was read on each object, empty for nothing."""
+        return ("",) * len(self) if self.texts is None else self.texts
+
     def split(self) -> tuple[View, ...]:
-        """Return one view for each photo."""
+        """Return one view for each photo; the first one has the `signs`."""
         if len(self.photos) == 1:
             return (self,)
         rows = self.photo_rows
         return tuple(
-            replace(self.select(rows == number), photo=None, photos=(photo,))
+            replace(
+                self.select(rows == number),
+                photo=None,
+                photos=(photo,),
+                signs=() if number else self.signs,
+            )
             for number, photo in enumerate(self.photos)
         )
 
@@ -374,7 +411,18 @@ class View(Signature):
         values = {name: getattr(self, name) for name in names}
         rows = {name: None if value is None else value[objects] for name, value in values.items()}
         codes, bearings = rows.pop("codes"), rows.pop("bearings")
-        return View(codes, bearings, **rows, photos=self.photos, notes=self.notes)
+        texts = self.texts
+        if texts is not None:
+            texts = tuple(texts[row] for row in np.arange(len(self))[objects].tolist())
+        return View(
+            codes,
+            bearings,
+            **rows,
+            texts=texts,
+            signs=self.signs,
+            photos=self.photos,
+            notes=self.notes,
+        )
 
     def turned(self, degrees: float) -> View:
         """Return the view with `degrees` added to its bearings, sorted clockwise."""
@@ -389,7 +437,8 @@ class View(Signature):
         """Return the values of `Signature.to_dict` and the details, for JSON and `parse_view`.
 
         ``ranges`` and the errors have None for unknown values; ``scores`` are by name of the
-        class. The values of `Photo.to_dict` are on the same level for one photo; for several
+        class; ``texts`` and ``signs`` are there if something was read. The values of
+        `Photo.to_dict` are on the same level for one photo; for several
         photos, they are in ``photos``, and ``photo`` has the number of the photo of each object.
         """
         plain = super().to_dict(taxonomy)
@@ -408,6 +457,10 @@ class View(Signature):
                 {names[code]: float(row[code]) for code in np.flatnonzero(row).tolist()}
                 for row in self.scores
             ]
+        if self.texts is not None:
+            values["texts"] = list(self.texts)
+        if self.signs:
+            values["signs"] = list(self.signs)
         if len(self.photos) == 1:
             return {**values, **self.photos[0].to_dict()}
         values["photos"] = [photo.to_dict() for photo in self.photos]
@@ -417,3 +470,10 @@ class View(Signature):
 
 def _none_for_nan(column: NDArray[np.float64]) -> list[float | None]:
     return [None if math.isnan(value) else value for value in column.tolist()]
+
+
+def _read_texts(what: str, texts: Sequence[str]) -> tuple[str, ...]:
+    """Return texts with single blanks; InputError unless they are a sequence of text."""
+    if isinstance(texts, str) or not all(isinstance(text, str) for text in texts):
+        raise InputError(f"{what} were given as {texts!r:.60}; give a list of text.")
+    return tuple(" ".join(text.split()) for text in texts)

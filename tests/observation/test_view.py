@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from noisy_cells import column, parts_of
 from sentences import refused
 
+from semsig_gis import paper_taxonomy
 from semsig_gis.core import InputError, Signature
-from semsig_gis.observation import FULL_VIEW, Photo, View
+from semsig_gis.observation import FULL_VIEW, Photo, View, parse_view
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -72,6 +73,30 @@ def test_joined_views_are_split_again() -> None:
     assert parts[0].class_scores()[0, 3] == 1.0
 
 
+def test_texts_stay_with_their_objects() -> None:
+    lamps = Signature(np.array([3, 1], np.uint8), np.array([10.0, 350.0]))
+    view = View.of(lamps, texts=("  Boulangerie  Paul ", ""), signs=("Rue du Pau", ""))
+    assert view.texts == ("Boulangerie Paul", "")
+    assert view.turned(20.0).texts == ("", "Boulangerie Paul")
+    assert view.select(np.array([False, True])).texts is None
+    both = View.joined([LAMP, view])
+    assert (both.texts, both.signs) == (("", "Boulangerie Paul", ""), ("Rue du Pau",))
+    assert [(part.texts, part.signs) for part in both.split()] == [
+        (None, ("Rue du Pau",)),
+        (("Boulangerie Paul", ""), ()),
+    ]
+    taxonomy = paper_taxonomy()
+    row = both.turned(0.0).to_dict(taxonomy)
+    again = parse_view({**row}, taxonomy=taxonomy)
+    assert again.to_dict(taxonomy) == row
+    assert "texts" not in View.of(LAMP).to_dict(taxonomy)
+
+
+def test_row_of_a_sign_is_a_view() -> None:
+    view = parse_view({"signs": ["Rue du Pau", 12, None]}, taxonomy=paper_taxonomy())
+    assert (len(view), view.signs) == (0, ("Rue du Pau", "12"))
+
+
 LAMP = Signature(np.array([3], np.uint8), np.array([80.0]))
 
 
@@ -82,6 +107,9 @@ LAMP = Signature(np.array([3], np.uint8), np.array([80.0]))
         (lambda: View.of(LAMP, ranges=[-1.0]), "a range is -1"),
         (lambda: View.of(LAMP, range_errors=[9.0]), "a range error is 9"),
         (lambda: View.of(LAMP, scores=np.zeros((1, 256))), "add up to 1"),
+        (lambda: View.of(LAMP, texts=("a", "b")), "2 texts were given for 1 objects"),
+        (lambda: View.of(LAMP, texts="a"), "give a list of text"),
+        (lambda: View.of(LAMP, signs=(12,)), "give a list of text"),
         (lambda: View.of(LAMP, photo=[1]), "a photo that is not there"),
         (lambda: View.of(LAMP, photos=()), "a view of no photo"),
         (lambda: Photo(sectors=((10, 10),)), "sees nothing"),

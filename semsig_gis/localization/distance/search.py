@@ -253,6 +253,7 @@ def _unused_notes(query: Signature, method: Method) -> tuple[str, ...]:
         "ranges": query.ranges is not None,
         "errors of bearings": query.bearing_errors is not None,
         "scores": query.scores is not None,
+        "texts": query.texts is not None or bool(query.signs),
         "sectors": any(photo.sectors for photo in query.photos),
         "errors of north": any(photo.north_sigma for photo in query.photos),
     }
