@@ -21,6 +21,10 @@ from .errors import SourceError as SourceError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import extra as extra
 from .errors import nearest_name as nearest_name
+from .families import FAMILIES as FAMILIES
+from .families import Family as Family
+from .families import codes_by_family as codes_by_family
+from .families import family_named as family_named
 from .geometry import CLASS_CODE as CLASS_CODE
 from .geometry import CLASS_NAME as CLASS_NAME
 from .geometry import COUNT as COUNT

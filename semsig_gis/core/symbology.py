@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.core.families import codes_by_family, family_named
 from semsig_gis.core.pictograms import GENERAL_PICTOGRAM, PICTOGRAMS
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 
 
 # The palette of Okabe and Ito and two colours of Tol, which colour-blind people can distinguish;
@@ -40,6 +41,12 @@ COLOURS = (
     "#e3b5e3",
     "#dddd99",
 )
+PLAIN_FAMILIES = ("", "furniture")
+"""Families with the colours of `COLOURS`; the classes of another have shades of its colour."""
+
+SHADE_STEPS = (0.0, 0.4, -0.3, 0.65, -0.55)
+"""Shares of white, or of black if negative, in the shades of the colour of a family."""
+
 SHAPES = ("circle", "square", "diamond", "triangle", "hexagon", "triangle_down", "cross")
 """Names of the shapes of symbols, which leave room for a letter; each output format draws them."""
 
@@ -63,6 +70,7 @@ class ClassSign:
     shape: str
     colour: str
     pictogram: str = field(default=GENERAL_PICTOGRAM, repr=False)
+    family: str = field(default="", repr=False)
     ink: str = field(init=False, repr=False)
     """Colour of the letter or pictogram: black or white, whichever contrasts more."""
 
@@ -87,7 +95,9 @@ def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
     Returns
     -------
     dict of int to ClassSign
-        By class code. Up to 18 classes differ in colour, up to 126 in colour or shape.
+        By class code. Up to 18 classes of street furniture differ in colour, up to 126 in colour
+        or shape. The classes of another family have shades of its colour, and its pictogram if they
+        have none of their own; up to 35 differ in shade or shape.
 
     Examples
     --------
@@ -95,16 +105,38 @@ def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
     ClassSign(symbol='D', title='Street light', shape='diamond', colour='#e69f00')
     """
     ordered = sorted(taxonomy.classes, key=lambda item: item.code)
-    return {
-        item.code: ClassSign(
+    classes = {item.code: item for item in ordered}
+    groups = codes_by_family(taxonomy, classes)
+    plain = [code for code, item in classes.items() if item.family in PLAIN_FAMILIES]
+    places = {code: number for number, code in enumerate(plain)}
+    for name, codes in groups.items():
+        if name not in PLAIN_FAMILIES:
+            places |= {code: number for number, code in enumerate(codes)}
+
+    def sign(item: ObjectClass) -> ClassSign:
+        number, family = places[item.code], family_named(item.family)
+        colour = (
+            COLOURS[number % len(COLOURS)]
+            if item.family in PLAIN_FAMILIES
+            else _shade(family.colour, SHADE_STEPS[number % len(SHADE_STEPS)])
+        )
+        return ClassSign(
             item.symbol,
             item.title,
             SHAPES[number % len(SHAPES)],
-            COLOURS[number % len(COLOURS)],
-            PICTOGRAMS.get(item.name, GENERAL_PICTOGRAM),
+            colour,
+            PICTOGRAMS.get(item.name, family.pictogram),
+            item.family,
         )
-        for number, item in enumerate(ordered)
-    }
+
+    return {code: sign(item) for code, item in classes.items()}
+
+
+def _shade(colour: str, step: float) -> str:
+    """Return a colour mixed with white by a step above 0, or with black by a step below 0."""
+    end, share = (255, step) if step > 0 else (0, -step)
+    channels = (round(part + share * (end - part)) for part in bytes.fromhex(colour[1:]))
+    return f"#{bytes(channels).hex()}"
 
 
 def _contrast(*colours: str) -> float:

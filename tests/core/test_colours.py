@@ -24,6 +24,7 @@ from semsig_gis.core import (
     COLOURS,
     DRIFT_COLOURS,
     FAILURES,
+    FAMILIES,
     FOUND_RAMP,
     GROUP_COLOURS,
     OBJECT_COLOURS,
@@ -213,7 +214,8 @@ def meanings() -> list[str]:
 
 
 def test_no_colour_has_two_meanings() -> None:
-    counts = Counter([*meanings(), *COLOURS])
+    families = [family.colour for family in FAMILIES.values()]
+    counts = Counter([*meanings(), *COLOURS, *families])
     assert [colour for colour, count in counts.items() if count > 1] == []
 
 

@@ -1,4 +1,4 @@
-"""Every class of the catalogues that come with semsig has a pictogram of its own."""
+"""Every class of the catalogues that come with semsig has a pictogram, of its own or its family."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from fontTools.pens.boundsPen import BoundsPen
 from fontTools.svgLib.path import parse_path
 
 from semsig_gis.core import (
+    FAMILIES,
     GENERAL_PICTOGRAM,
     PICTOGRAMS,
     ObjectClass,
@@ -15,14 +16,18 @@ from semsig_gis.core import (
 )
 from semsig_gis.sources import built_in_taxonomy
 
-DRAWINGS = {**PICTOGRAMS, "another class": GENERAL_PICTOGRAM}
+DRAWINGS = {
+    **PICTOGRAMS,
+    "another class": GENERAL_PICTOGRAM,
+    **{f"family {name}": family.pictogram for name, family in FAMILIES.items()},
+}
 
 CLASSES = built_in_taxonomy().classes
 
 
-@pytest.mark.parametrize("name", [item.name for item in CLASSES])
-def test_a_class_that_comes_with_semsig_has_a_pictogram(name: str) -> None:
-    assert name in PICTOGRAMS
+def test_a_class_that_comes_with_semsig_has_a_pictogram() -> None:
+    signs = class_signs(Taxonomy(CLASSES))
+    assert [item.name for item in CLASSES if signs[item.code].pictogram == GENERAL_PICTOGRAM] == []
 
 
 @pytest.mark.parametrize("name", DRAWINGS)
@@ -44,3 +49,15 @@ def test_a_sign_has_the_pictogram_of_its_class() -> None:
     signs = class_signs(Taxonomy((CLASSES[0], kiosk)))
     assert signs[CLASSES[0].code].pictogram == PICTOGRAMS[CLASSES[0].name]
     assert signs[90].pictogram == GENERAL_PICTOGRAM
+
+
+def test_a_sign_has_the_pictogram_and_a_shade_of_its_family() -> None:
+    kinds = [
+        ObjectClass(code, letter, f"stall_{code}", f"Stall {code}", family="shop")
+        for code, letter in enumerate("\u0416\u03a9\u00c6", start=90)
+    ]
+    signs = class_signs(Taxonomy((CLASSES[0], *kinds)))
+    assert {signs[code].pictogram for code in (90, 91, 92)} == {FAMILIES["shop"].pictogram}
+    assert len({signs[code].colour for code in (90, 91, 92)}) == 3
+    assert signs[90].colour == FAMILIES["shop"].colour
+    assert signs[CLASSES[0].code] == class_signs(Taxonomy(CLASSES[:1]))[CLASSES[0].code]

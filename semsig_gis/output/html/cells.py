@@ -13,6 +13,7 @@ from folium.template import Template
 from semsig_gis.core import (
     BEARING_UNITS,
     FULL_TURN,
+    MAX_CODE,
     SAME_LEVELS,
     SAME_TYPES,
     InputError,
@@ -148,12 +149,12 @@ def packed_signatures(
     """
     places, codes = _visible_objects(database)
     return {
-        f"{name}.types": packed(database.taxonomy.symbol_bytes[database.codes]),
+        f"{name}.types": packed(database.codes),
         f"{name}.ends": steps(ends.astype(np.int32)),
         f"{name}.levels": packed(database.levels),
         f"{name}.x": steps(places[:, 0]),
         f"{name}.y": steps(places[:, 1]),
-        f"{name}.classes": packed(database.taxonomy.symbol_bytes[codes]),
+        f"{name}.classes": packed(codes),
     }
 
 
@@ -189,6 +190,7 @@ def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str,
     }
     grid = {
         "levels": database.spec.levels,
+        "symbols": database.taxonomy.decode(np.arange(MAX_CODE + 1)),
         "step": database.grid.step,
         "tolerance": CLICK_TOLERANCE_M,
         "sight": database.spec.radius,

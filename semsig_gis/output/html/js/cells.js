@@ -100,8 +100,8 @@ semsig.City = class {
     return [cell > 0 ? ends[cell - 1] : 0, ends[cell]];
   }
   types(name, cell) {
-    return String.fromCharCode(
-      ...this.data[`${name}.types`].subarray(...this.part(name, cell)));
+    const codes = this.data[`${name}.types`].subarray(...this.part(name, cell));
+    return Array.from(codes, (code) => this.grid.symbols[code]).join("");
   }
   // The objects around a cell, nearest first: class, degrees, metres, offset from its middle.
   around(name, cell) {
@@ -115,7 +115,7 @@ semsig.City = class {
       const metres = Math.hypot(right, up);
       if (metres > reach + 1) continue;
       const degrees = (Math.atan2(right, up) / Math.PI * 180 + 360) % 360;
-      near.push({symbol: String.fromCharCode(classes[at]), degrees, metres, right, up});
+      near.push({symbol: this.grid.symbols[classes[at]], degrees, metres, right, up});
     }
     return near.sort((first, second) => first.metres - second.metres);
   }
