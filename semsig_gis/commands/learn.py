@@ -235,7 +235,7 @@ def learnt_noise(
                 radius=database.spec.radius,
                 north_sigma=sigma,
                 footprints=store.buildings_around(
-                    places, distance=database.reach, occlusion=database.occlusion
+                    places, distance=database.near_reach, occlusion=database.occlusion
                 ),
             )
     # The uncertainty of the sample places is not an error of the detector.

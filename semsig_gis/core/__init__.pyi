@@ -116,10 +116,10 @@ from .rtree import ObjectIndex as ObjectIndex
 from .rtree import PackedIndex as PackedIndex
 from .signature import BEARING_UNITS as BEARING_UNITS
 from .signature import DISTANCE_UNITS as DISTANCE_UNITS
+from .signature import DistanceScale as DistanceScale
 from .signature import Signature as Signature
 from .signature import SignatureRecord as SignatureRecord
 from .signature import SignatureSpec as SignatureSpec
-from .signature import distance_units_of as distance_units_of
 from .signature import quantize as quantize
 from .signature import wrapped_bearings as wrapped_bearings
 from .statistics import binomial_tail as binomial_tail

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +28,7 @@ MAX_LEVELS = 255
 BEARING_UNITS = 7200
 # Stored steps of the largest visibility range; a unit is 12 cm if that is 30 m.
 DISTANCE_UNITS = 255
+LOG_SCALE_M = 10.0  # far beyond it, logarithmic units grow in proportion to the distance
 
 
 class SignatureRecord(TypedDict):
@@ -83,10 +85,85 @@ def quantize(bearings: ArrayLike, levels: int) -> NDArray[np.uint8]:
     return np.minimum(scaled, levels - 1).astype(np.uint8)
 
 
-def distance_units_of(distances: NDArray[np.float64], reach: float) -> NDArray[np.uint8]:
-    """Return distances in metres rounded to units of ``reach / 255``, at most 255."""
-    units = np.rint(distances * (DISTANCE_UNITS / reach))
-    return np.minimum(units, DISTANCE_UNITS).astype(np.uint8)
+@dataclass(frozen=True)
+class DistanceScale:
+    """The metres of the 256 stored distance units.
+
+    Linear units are ``reach / 255``. Logarithmic ones, for databases with landmarks, grow with the
+    distance: unit `u` is ``10 m * (exp(u b) - 1)``, and the last is `reach`.
+
+    Parameters
+    ----------
+    reach : float
+        Metres of the last unit.
+    logarithmic : bool, default False
+        Whether the units grow with the distance.
+
+    Examples
+    --------
+    >>> DistanceScale(51.0).units(np.array([0.0, 10.0, 51.0])).tolist()
+    [0, 50, 255]
+    >>> far = DistanceScale(2000.0, logarithmic=True)
+    >>> far.units(np.array([0.0, 10.0, 2000.0])).tolist()
+    [0, 33, 255]
+    >>> far.metres[[1, 254, 255]].round(2).tolist()
+    [0.21, 1958.63, 2000.0]
+    """
+
+    reach: float
+    logarithmic: bool = False
+
+    @classmethod
+    def of(cls, taxonomy: Taxonomy, radius: float) -> DistanceScale:
+        """Return the scale of a database: logarithmic if a class is tall.
+
+        `radius` is the visibility range in metres of classes without their own.
+        """
+        tall = any(item.tall for item in taxonomy.classes)
+        return cls(float(taxonomy.ranges(radius).max()), logarithmic=tall)
+
+    @property
+    def _growth(self) -> float:
+        return math.log1p(self.reach / LOG_SCALE_M) / DISTANCE_UNITS
+
+    @property
+    def unit(self) -> float:
+        """Metres of the first unit."""
+        if self.logarithmic:
+            return LOG_SCALE_M * math.expm1(self._growth)
+        return self.reach / DISTANCE_UNITS
+
+    @cached_property
+    def steps(self) -> NDArray[np.float64]:
+        """Every unit in multiples of the first, shape (256,)."""
+        units = np.arange(DISTANCE_UNITS + 1, dtype=np.float64)
+        if self.logarithmic:
+            return np.asarray(np.expm1(units * self._growth) / math.expm1(self._growth))
+        return units
+
+    @cached_property
+    def metres(self) -> NDArray[np.float64]:
+        """Metres of every unit, shape (256,)."""
+        return self.steps * np.float64(self.unit)
+
+    @cached_property
+    def positive_metres(self) -> NDArray[np.float64]:
+        """Metres of every unit, shape (256,), with half of the first instead of 0."""
+        return np.asarray(np.maximum(self.steps, 0.5) * self.unit)
+
+    def units(self, distances: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Return distances in metres rounded to units, at most 255."""
+        if self.logarithmic:
+            units = np.rint(np.log1p(distances / LOG_SCALE_M) / self._growth)
+        else:
+            units = np.rint(distances * (DISTANCE_UNITS / self.reach))
+        return np.minimum(units, DISTANCE_UNITS).astype(np.uint8)
+
+    def rounding(self, distances: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return half a unit in metres, the largest rounding error, at some distances."""
+        if self.logarithmic:
+            return np.asarray((distances + LOG_SCALE_M) * math.expm1(self._growth / 2.0))
+        return np.full(np.shape(distances), self.reach / DISTANCE_UNITS / 2.0)
 
 
 def wrapped_bearings(bearings: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:

@@ -335,3 +335,11 @@ class Taxonomy(Displayed):
             if item.range_m is not None:
                 table[item.code] = item.range_m
         return table
+
+    def near_reach(self, radius: float) -> float:
+        """Return the longest visibility range in metres of the classes that are not tall.
+
+        It is at least `radius`, the range of classes without their own.
+        """
+        ranges = (item.range_m or 0.0 for item in self.classes if not item.tall)
+        return float(max([radius, *ranges]))

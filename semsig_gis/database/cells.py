@@ -11,6 +11,7 @@ import numpy as np
 
 from semsig_gis.core import (
     BEARING_UNITS,
+    DistanceScale,
     EmptyResultError,
     GridSpec,
     InputError,
@@ -20,7 +21,6 @@ from semsig_gis.core import (
     cell_ids,
     cells_near,
     consecutive,
-    distance_units_of,
     require_memory,
     split_ids,
 )
@@ -250,6 +250,7 @@ def build_cells(
         widths=None if streets is None else streets.get("half_width"),
     )
     codes, ranges = objects.codes, objects.taxonomy.ranges(spec.radius)
+    scale = DistanceScale.of(objects.taxonomy, spec.radius)
     count = int(mask.sum())
     share = count / max(len(mask), 1)
     expected = expected_pairs(ranges[codes], grid=grid, cells=count, share=share)
@@ -275,7 +276,7 @@ def build_cells(
                 np.bincount(pairs.viewpoint, minlength=cells.stop - cells.start),
                 codes[pairs.object][order],
                 np.minimum(units, BEARING_UNITS - 1).astype(np.uint16)[order],
-                distance_units_of(pairs.distance, ranges.max())[order],
+                scale.units(pairs.distance)[order],
             )
         )
         if progress is not None:

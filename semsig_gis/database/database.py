@@ -21,10 +21,10 @@ from pyproj import CRS
 from semsig_gis import __version__
 from semsig_gis.core import (
     BEARING_UNITS,
-    DISTANCE_UNITS,
     LICENSES,
     DatabaseError,
     Displayed,
+    DistanceScale,
     InputError,
     Signature,
     UnknownNameError,
@@ -91,7 +91,7 @@ class SignatureDatabase(Displayed):
     bearing_units : ndarray of uint16, shape (m,)
         Bearing in 1/20 degree, rounded down.
     distance_units : ndarray of uint8, shape (m,)
-        Distance in 1/255 of `reach`, rounded.
+        Distance in units of `scale`, rounded.
     grid : GridSpec
         The grid of the cells.
     spec : SignatureSpec
@@ -180,13 +180,22 @@ class SignatureDatabase(Displayed):
     @cached_property
     def reach(self) -> float:
         """The largest visibility range of any class, in metres."""
-        ranges = (item.range_m or 0.0 for item in self.taxonomy.classes)
-        return float(max([self.spec.radius, *ranges]))
+        return self.scale.reach
+
+    @cached_property
+    def near_reach(self) -> float:
+        """The largest visibility range of the classes that are not tall, in metres."""
+        return self.taxonomy.near_reach(self.spec.radius)
+
+    @cached_property
+    def scale(self) -> DistanceScale:
+        """The metres of the distance units; logarithmic if a class is tall."""
+        return DistanceScale.of(self.taxonomy, self.spec.radius)
 
     @property
     def distances(self) -> NDArray[np.float64]:
-        """Distance of every entry in metres, to 1/255 of `reach`, shape (m,)."""
-        return self.distance_units * np.float64(self.reach / DISTANCE_UNITS)
+        """Distance of every entry in metres, rounded to a unit of `scale`, shape (m,)."""
+        return self.scale.metres[self.distance_units]
 
     @cached_property
     def levels(self) -> NDArray[np.uint8]:
@@ -406,7 +415,7 @@ class CellTable:
         degrees = (unit * 360 / BEARING_UNITS for unit in range(BEARING_UNITS))
         self._degrees = pa.array([f"{bearing:.2f}" for bearing in degrees])
         self._levels = pa.array([str(level) for level in range(1 << 8)])
-        distances = database.reach * np.arange(DISTANCE_UNITS + 1) / DISTANCE_UNITS
+        distances = database.scale.metres
         decimals = max(2, math.ceil(-math.log10(distances[1])))  # so that they differ
         self._metres = pa.array([f"{distance:.{decimals}f}" for distance in distances.tolist()])
         self._groups = {

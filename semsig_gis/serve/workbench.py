@@ -572,7 +572,7 @@ class Workbench:
             index=self.store.index,
             radius=self.database.spec.radius,
             footprints=self.store.buildings_around(
-                place, distance=self.database.reach, occlusion=self.database.occlusion
+                place, distance=self.database.near_reach, occlusion=self.database.occlusion
             ),
         )
         return Sight(codes=views.codes, bearings=views.bearings, distances=views.distances)

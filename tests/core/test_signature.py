@@ -12,9 +12,13 @@ from sentences import refused
 
 from semsig_gis.core import (
     BEARING_UNITS,
+    DISTANCE_UNITS,
+    DistanceScale,
     InputError,
+    ObjectClass,
     Signature,
     SignatureSpec,
+    Taxonomy,
     UnknownNameError,
     quantize,
 )
@@ -219,3 +223,43 @@ def test_error_names_an_unknown_symbol(types: str) -> None:
     unknown = next(symbol for symbol in types if symbol != "D")
     with refused(UnknownNameError, f"symbol {unknown!r}", "semsig info --symbols"):
         parsed(types)
+
+
+# --- Distance units ---------------------------------------------------------------------------
+
+
+def rounded_share(distances: list[float], reach: float) -> list[int]:
+    """Return distances in whole parts of the reach over 255."""
+    return [min(round(distance * (255 / reach)), 255) for distance in distances]
+
+
+@given(st.floats(0.5, 6000.0), st.lists(st.floats(0.0, 1.1), max_size=20))
+def test_linear_units_are_equal_parts_of_the_reach(reach: float, shares: list[float]) -> None:
+    scale, distances = DistanceScale(reach), [share * reach for share in shares]
+    assert scale.units(np.array(distances)).tolist() == rounded_share(distances, reach)
+    numbers = np.arange(DISTANCE_UNITS + 1)
+    assert scale.metres.tolist() == (numbers * np.float64(reach / 255)).tolist()
+    assert scale.positive_metres.tolist() == (np.maximum(numbers, 0.5) * (reach / 255)).tolist()
+    assert scale.rounding(np.array(shares)).tolist() == [reach / 255 / 2.0] * len(shares)
+
+
+@given(st.floats(100.0, 6000.0), st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20))
+def test_logarithmic_units_are_off_by_a_small_share(reach: float, shares: list[float]) -> None:
+    scale, distances = DistanceScale(reach, logarithmic=True), np.array(shares) * reach
+    errors = np.abs(scale.metres[scale.units(distances)] - distances)
+    assert (errors <= scale.rounding(distances) * (1.0 + 1e-9)).all()
+    assert (errors <= np.maximum(0.15, 0.021 * distances) + 0.05).all()
+    assert scale.metres[0] == 0.0
+    assert scale.metres[-1] == pytest.approx(reach)
+    assert (scale.units(scale.metres) == np.arange(256)).all()
+
+
+def test_scale_is_logarithmic_if_a_class_is_tall() -> None:
+    tower = ObjectClass(224, "w", "tower", "Tower", range_m=2000.0, tall=True)
+    kiosk = ObjectClass(225, "k", "kiosk", "Kiosk", range_m=45.0)
+    near = TAXONOMY.extended([kiosk])
+    assert DistanceScale.of(near, 30.0) == DistanceScale(45.0)
+    far = near.extended([tower])
+    assert DistanceScale.of(far, 30.0) == DistanceScale(2000.0, logarithmic=True)
+    assert far.near_reach(30.0) == near.near_reach(30.0) == 45.0
+    assert Taxonomy((tower,)).near_reach(30.0) == 30.0

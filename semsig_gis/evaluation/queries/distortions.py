@@ -21,7 +21,6 @@ from semsig_gis.core import (
     Signature,
     UnknownNameError,
     angular_distance,
-    distance_units_of,
     nearest_name,
     require_number,
     wrap_degrees,
@@ -284,7 +283,7 @@ class SimulatedDetector:
         # Detection: by class, by fading with distance and by `half`.
         chances = 1.0 - table.missed[length, table.row_of[sight.codes]]
         kinds = table.row_of[sight.codes]
-        chances *= table.fading[kinds, distance_units_of(sight.distances, table.reach)]
+        chances *= table.fading[kinds, table.scale.units(sight.distances)]
         chances *= np.exp2(-((sight.distances / self.half) ** 2))
         detections = sight.only(rng.random(len(sight)) < chances)
         # Classification: a random row of the cumulative confusion matrix.

@@ -226,7 +226,9 @@ def _sights(
         places,
         index=store.index,
         radius=city.spec.radius,
-        footprints=store.buildings_around(places, distance=city.reach, occlusion=city.occlusion),
+        footprints=store.buildings_around(
+            places, distance=city.near_reach, occlusion=city.occlusion
+        ),
     )
     parts = (slice(low, high) for low, high in pairwise(views.offsets.tolist()))
     return places, (

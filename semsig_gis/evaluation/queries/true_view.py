@@ -15,7 +15,6 @@ import numpy as np
 
 from semsig_gis.core import (
     BEARING_UNITS,
-    DISTANCE_UNITS,
     FULL_TURN,
     Displayed,
     Signature,
@@ -115,7 +114,7 @@ class Sight(Displayed):
         return cls(
             codes=database.codes[part],
             bearings=database.bearing_units[part] * np.float64(FULL_TURN / BEARING_UNITS),
-            distances=database.distance_units[part] * np.float64(database.reach / DISTANCE_UNITS),
+            distances=database.scale.metres[database.distance_units[part]],
         )
 
     def only(self, objects: ArrayLike) -> Sight:

@@ -200,7 +200,7 @@ class _Search:
         ]
         points = np.concatenate([points for points, _ in places])
         footprints = self.store.buildings_around(
-            points, distance=self.database.reach, occlusion=self.database.occlusion
+            points, distance=self.database.near_reach, occlusion=self.database.occlusion
         )
         radius = self.database.spec.radius
         objects = self.store.objects

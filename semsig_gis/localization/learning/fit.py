@@ -19,8 +19,8 @@ import pandas as pd
 from semsig_gis.core import (
     DISTANCE_UNITS,
     WILDCARD,
+    DistanceScale,
     InputError,
-    distance_units_of,
     log_interval,
     poisson_interval,
     wilson_interval,
@@ -117,7 +117,7 @@ class Evidence:
         table, views, pairs = replace(self.start, sigma=sigma), self.views, self.pairs
         spreads = bearing_spreads(table, self.kinds, self.distances)
         inside, _ = self.detections.inside(self.owners, views.bearings, spreads)
-        units = distance_units_of(self.distances, table.reach)
+        units = table.scale.units(self.distances)
         mask = (inside > 0) | (table.leaving[self.kinds, units] > 0)
         rough = self.detections.bearing_errors[pairs.detections]
         close = np.abs(pairs.away) <= FARTHEST * np.hypot(spreads[pairs.objects], rough)
@@ -196,7 +196,7 @@ def gather_evidence(
         )
     codes = np.unique(np.concatenate([views.codes, *names])).astype(np.uint8)
     codes = codes[codes != WILDCARD]
-    start = _starting_model(codes, taxonomy.ranges(radius), position_sigma)
+    start = _starting_model(codes, taxonomy, radius, position_sigma)
     detections = Detections.of(detected, start)
     starts, bearings = detections.starts, detections.bearings
     return Evidence(
@@ -211,7 +211,7 @@ def gather_evidence(
 
 
 def _starting_model(
-    codes: NDArray[np.uint8], ranges: NDArray[np.float64], position_sigma: float
+    codes: NDArray[np.uint8], taxonomy: Taxonomy, radius: float, position_sigma: float
 ) -> NoiseTable:
     """Return a typical detector, with the given deviation of places in metres."""
     count = len(codes)
@@ -224,9 +224,9 @@ def _starting_model(
         sigma=np.full(count, 8.0),
         range_sigma=np.full(count, 0.25),
         position_sigma=position_sigma,
-        ranges=ranges[codes],
+        ranges=taxonomy.ranges(radius)[codes],
         fading=np.ones((count, DISTANCE_UNITS + 1)),
-        reach=float(ranges.max()),
+        scale=DistanceScale.of(taxonomy, radius),
     )
 
 
@@ -283,7 +283,7 @@ def _detected_objects(
 ) -> NDArray[np.float64]:
     """Return the expected hits and trials of detection, shape (2, objects, knots)."""
     kinds, near = evidence.kinds, model.detected[0, evidence.kinds]
-    units = distance_units_of(evidence.distances, model.reach)
+    units = model.scale.units(evidence.distances)
     hits = np.bincount(evidence.pairs.objects, association.chances, len(kinds))
     hits = np.clip(hits, 0.0, 1.0)
     # The chance that an object that was not detected was in range and in the sectors.
@@ -299,7 +299,7 @@ def _detected_objects(
 
 def fading_at_knots(model: NoiseTable) -> NDArray[np.float64]:
     """Return the remaining share of the detection of each class at each knot, shape (k, knots)."""
-    units = np.rint(model.ranges[:, None] * KNOTS * (DISTANCE_UNITS / model.reach))
+    units = model.scale.units(model.ranges[:, None] * KNOTS)
     return np.take_along_axis(model.fading, units.astype(np.int64), axis=1)
 
 
@@ -351,9 +351,8 @@ def next_model(
     spread = wrong + PRIOR_SAMPLES * misnamed[:, None] * _others(size)
     shares = (false[:, 0] + PRIOR_SAMPLES / size) / (false.sum() + PRIOR_SAMPLES)
     rates = np.clip(_rates_by_knot(hits, trials, fading=fading), LEAST, MOST)
-    metres = np.arange(DISTANCE_UNITS + 1) * (model.reach / DISTANCE_UNITS)
     faded = [
-        np.interp(metres, KNOTS * limit, row / row[0])
+        np.interp(model.scale.metres, KNOTS * limit, row / row[0])
         for limit, row in zip(model.ranges.tolist(), rates, strict=True)
     ]
     return replace(

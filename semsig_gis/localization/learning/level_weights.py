@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core import DISTANCE_UNITS
 from semsig_gis.localization.likelihood.association import associate
 from semsig_gis.localization.noise.levels import MOST_DETECTION, Level
 
@@ -62,10 +61,10 @@ def detection_levels(evidence: Evidence, model: NoiseTable, *, fading: bool) -> 
 
 def _at_level(model: NoiseTable, detection: float, reach: float) -> NoiseTable:
     """Return the table of a level, as `level_mixture` makes it from a specification."""
-    units = np.arange(DISTANCE_UNITS + 1)
+    steps = model.scale.steps
     near = 1.0 - model.missed
     fading: NDArray[np.float64] = np.stack(
-        [np.interp(units / reach, units, row) for row in model.fading]
+        [np.interp(steps / reach, steps, row) for row in model.fading]
     )
     return replace(
         model,

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, distance_units_of, signed_degrees
+from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, signed_degrees
 from semsig_gis.database import visible_objects_in
 from semsig_gis.localization.likelihood.index import CellScores, own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
@@ -194,7 +194,7 @@ def associate(
     rows, kinds = table.length_rows(lengths), table.row_of[views.codes]
     owners = np.repeat(np.arange(len(views)), views.lengths)
     distances = at_distances(table, views)
-    units = distance_units_of(distances, table.reach)
+    units = table.scale.units(distances)
     spreads = bearing_spreads(table, kinds, distances)
     # By object: the chances of its detection and of a miss.
     inside, squares = photos.inside(owners, views.bearings, spreads)

@@ -19,11 +19,9 @@ import numpy as np
 
 from semsig_gis.core import (
     BEARING_UNITS,
-    DISTANCE_UNITS,
     FULL_TURN,
     Displayed,
     crs_label,
-    distance_units_of,
     share_rows,
 )
 from semsig_gis.localization.likelihood.photo import PhotoTable
@@ -220,7 +218,7 @@ class LikelihoodIndex(Displayed):
             def score_part(part: NDArray[np.int64]) -> None:
                 views = visible_objects_off_centre(self.database, cells[slice(*part)], points)
                 bins = (views.bearings * (BINS / FULL_TURN)).astype(np.uint16) % np.uint16(BINS)
-                units = distance_units_of(views.distances, levels.table.reach)
+                units = levels.table.scale.units(views.distances)
                 objects = levels.objects(views.offsets, views.codes, bins, units)
                 total = sum(scorer(objects)[0] for scorer in scorers) * power
                 by_point = np.asarray(total, np.float64).reshape(-1, len(points))
@@ -387,8 +385,8 @@ class NoiseLevels:
         metres, detected = table.distances, table.detected
         remaining, leaving = table.remaining, table.leaving
         # Levels are spaced by the logarithm of the distance; a level is the mean of its units.
-        units = np.maximum(np.arange(DISTANCE_UNITS + 1), 1)
-        logs = (DISTANCE_LEVELS - 1) * np.log(units) / math.log(DISTANCE_UNITS)
+        steps = np.maximum(table.scale.steps, 1.0)
+        logs = (DISTANCE_LEVELS - 1) * np.log(steps) / math.log(steps[-1])
         level_of = np.rint(logs).astype(np.int64)
         count = np.maximum(np.bincount(level_of, minlength=DISTANCE_LEVELS), 1)
 

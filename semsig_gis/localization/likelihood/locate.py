@@ -695,7 +695,7 @@ class LikelihoodLocator:
             radius=database.spec.radius,
             heading=headings,
             footprints=self.store.buildings_around(
-                np.array([[x, y]]), distance=database.reach, occlusion=database.occlusion
+                np.array([[x, y]]), distance=database.near_reach, occlusion=database.occlusion
             ),
         )
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import BEARING_UNITS, DISTANCE_UNITS, FULL_TURN, cell_ids, compiled, share_rows
+from semsig_gis.core import BEARING_UNITS, FULL_TURN, cell_ids, compiled, share_rows
 from semsig_gis.database import VisibleObjects
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def visible_objects_off_centre(
         distance_units=database.distance_units,
         ranges=database.taxonomy.ranges(database.spec.radius),
         # The nearest objects are not at exactly the point.
-        metres=np.maximum(np.arange(DISTANCE_UNITS + 1), 0.5) * (database.reach / DISTANCE_UNITS),
+        metres=database.scale.positive_metres,
         east=np.sin(angles),
         north=np.cos(angles),
         step=float(database.grid.step),

@@ -26,11 +26,9 @@ import numpy as np
 
 from semsig_gis.core import (
     BEARING_UNITS,
-    DISTANCE_UNITS,
     FULL_TURN,
     WILDCARD,
     InputError,
-    distance_units_of,
     share_rows,
 )
 from semsig_gis.localization.likelihood.records import (
@@ -85,7 +83,7 @@ class PhotoTable:
         unknown = np.full(size, math.nan)
         ranges = unknown if photo.ranges is None else photo.ranges
         ranged = ~np.isnan(ranges)
-        disc = np.where(ranged, 2.0 * (np.where(ranged, ranges, 1.0) / table.reach) ** 2, 1.0)
+        disc = np.where(ranged, 2.0 * (np.where(ranged, ranges, 1.0) / table.scale.reach) ** 2, 1.0)
         if photo.scores is None:
             codes = np.zeros(size, np.uint8) if photo.codes is None else photo.codes
             table.class_rows(codes)  # raises for unknown classes
@@ -160,13 +158,13 @@ def photo_loglik(
     first = tables[0]
     bearing_units = np.minimum(views.bearings * (BEARING_UNITS / FULL_TURN), BEARING_UNITS - 1)
     kinds = first.row_of[views.codes]
+    limits = first.ranges[kinds]
     objects = PlaceObjects(
         offsets=views.offsets,
         kinds=kinds,
         bearing_units=bearing_units.astype(np.uint16),
-        distance_units=distance_units_of(views.distances, first.reach),
-        # Half a unit is rounding.
-        beyond=views.distances > first.ranges[kinds] + first.reach / DISTANCE_UNITS / 2.0,
+        distance_units=first.scale.units(views.distances),
+        beyond=views.distances > limits + first.scale.rounding(limits),
     )
     prior = np.zeros(turns.shape) if log_prior is None else np.ascontiguousarray(log_prior)
     grid = TurnGrid(np.ascontiguousarray(turns, dtype=np.float64), prior)

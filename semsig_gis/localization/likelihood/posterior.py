@@ -438,7 +438,8 @@ def refine(
     )
     photo_tables = [PhotoTable.of(photo, tables[0]) for photo in photos]
     size, most = float(step), DIVIDED_PARTS[0]
-    footprints = store.buildings_around(cells, distance=tables[0].reach + size, occlusion=occlusion)
+    near = objects.taxonomy.near_reach(radius)
+    footprints = store.buildings_around(cells, distance=near + size, occlusion=occlusion)
     parts = np.asarray(cells[:most], dtype=np.float64)
     prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[:most]
     turned = np.stack(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import DISTANCE_UNITS, WILDCARD, InputError, nearest_name
+from semsig_gis.core import DISTANCE_UNITS, WILDCARD, DistanceScale, InputError, nearest_name
 from semsig_gis.localization.noise.model import ALL, BY_CLASS
 
 if TYPE_CHECKING:
@@ -42,8 +42,7 @@ class NoiseTable:
     per signature by class, `sigma` the standard deviation of a bearing in degrees by class,
     `range_sigma` that of the logarithm of a rough distance, and `position_sigma` that of the place
     of the observer in metres. `ranges` are the visibility ranges of the classes in metres, and
-    `fading`, shape (k, 256), the remaining share of detection by distance unit; 255 units are
-    `reach` metres.
+    `fading`, shape (k, 256), the remaining share of detection by distance unit of `scale`.
     """
 
     codes: NDArray[np.uint8]
@@ -56,12 +55,12 @@ class NoiseTable:
     position_sigma: float
     ranges: NDArray[np.float64]
     fading: NDArray[np.float64]
-    reach: float
+    scale: DistanceScale
 
-    @cached_property
+    @property
     def distances(self) -> NDArray[np.float64]:
         """Metres of each distance unit, shape (256,); the nearest is above 0."""
-        return np.asarray(np.maximum(np.arange(256), 0.5) * (self.reach / DISTANCE_UNITS))
+        return self.scale.positive_metres
 
     @cached_property
     def inside(self) -> NDArray[np.float64]:
@@ -187,8 +186,8 @@ def noise_tables(
     row_of = {code: row for row, code in enumerate(codes.tolist())}
     rows = {item.name: row_of.get(item.code, len(codes)) for item in taxonomy.classes}
     ranges = taxonomy.ranges(radius)
-    reach = float(ranges.max())
-    tables = tuple(_table(spec, rows, codes, longest, ranges[codes], reach) for spec in noise.specs)
+    scale = DistanceScale.of(taxonomy, radius)
+    tables = tuple(_table(spec, rows, codes, longest, ranges[codes], scale) for spec in noise.specs)
     return tables, np.asarray(noise.weights, dtype=np.float64)
 
 
@@ -233,7 +232,7 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
         position_sigma=float(position) ** 0.5,
         ranges=tables[0].ranges,
         fading=mean("fading"),
-        reach=tables[0].reach,
+        scale=tables[0].scale,
     )
 
 
@@ -271,7 +270,7 @@ def _table(  # noqa: PLR0917 - a private helper of one caller
     codes: NDArray[np.uint8],
     longest: int,
     ranges: NDArray[np.float64],
-    reach: float,
+    scale: DistanceScale,
 ) -> NoiseTable:
     """Return the table of one model, given the row of each class of the taxonomy."""
     count = len(codes)
@@ -319,16 +318,16 @@ def _table(  # noqa: PLR0917 - a private helper of one caller
         range_sigma=by_class(spec.range_sigma, spec.range_sigma_by_class),
         position_sigma=spec.position_sigma,
         ranges=ranges,
-        fading=_fading(spec, rows, count, reach),
-        reach=reach,
+        fading=_fading(spec, rows, count, scale),
+        scale=scale,
     )
 
 
 def _fading(
-    spec: NoiseSpec, rows: Mapping[str, int], count: int, reach: float
+    spec: NoiseSpec, rows: Mapping[str, int], count: int, scale: DistanceScale
 ) -> NDArray[np.float64]:
     """Return the remaining share of detection by class and distance unit, shape (count, 256)."""
-    metres = np.arange(DISTANCE_UNITS + 1) * (reach / DISTANCE_UNITS)
+    metres = scale.metres
 
     def shares(points: Sequence[Sequence[float]]) -> NDArray[np.float64]:
         distances, values = np.transpose(np.asarray(points, dtype=np.float64))

@@ -18,13 +18,14 @@ from semsig_gis.core import (
     BEARING_UNITS,
     CLASS_CODE,
     COUNT,
-    DISTANCE_UNITS,
+    FULL_TURN,
     GEOMETRY,
     MERGED,
     SOURCE,
     SOURCE_ID,
     DatabaseError,
     Displayed,
+    DistanceScale,
     Taxonomy,
     crs_label,
 )
@@ -34,9 +35,10 @@ from semsig_gis.objects import objects_of
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
-    from numpy.typing import DTypeLike
+    from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import Identifiability
@@ -135,13 +137,16 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
         columns = [*CELL_COLUMNS, *(chances if specs["identifiability"] else [])]
         cells = _read_columns(path, CELLS, columns).sort_by("cell_id")
         # Degrees and metres become the integer units of a database again.
-        reach = Taxonomy.from_list(specs["taxonomy"]).ranges(specs["signature"]["radius"]).max()
+        taxonomy = Taxonomy.from_list(specs["taxonomy"])
+        scale = DistanceScale.of(taxonomy, specs["signature"]["radius"])
         signatures = pa.table(
             {
                 "cell_id": cells["cell_id"],
                 "types": cells["types"],
-                "bearings": _units(cells["bearings"], BEARING_UNITS / 360.0, np.uint16),
-                "distances": _units(cells["distances"], DISTANCE_UNITS / float(reach), np.uint8),
+                "bearings": _units(cells["bearings"], _bearing_units, most=FULL_TURN),
+                "distances": _units(
+                    cells["distances"], scale.units, most=scale.reach + scale.unit / 2.0
+                ),
             }
         )
         database = database_of(signatures, specs, crs, path=path)
@@ -209,15 +214,28 @@ def _read_columns(path: str | Path, layer: str, columns: list[str]) -> pa.Table:
     )
 
 
-def _units(texts: pa.ChunkedArray, units: float, kind: DTypeLike) -> pa.ChunkedArray:
-    """Parse numbers separated by spaces; return a list of whole units for each text."""
+def _bearing_units(bearings: NDArray[np.float64]) -> NDArray[np.uint16]:
+    """Return bearings in degrees as units of a database."""
+    return np.rint(bearings * (BEARING_UNITS / FULL_TURN)).astype(np.uint16)
+
+
+def _units(
+    texts: pa.ChunkedArray,
+    units_of: Callable[[NDArray[np.float64]], NDArray[np.uint8 | np.uint16]],
+    *,
+    most: float,
+) -> pa.ChunkedArray:
+    """Parse numbers separated by spaces; return a list of the units of each text.
+
+    Numbers are 0 to `most`.
+    """
     lists = []
     for chunk in texts.chunks:
         parts = pc.split_pattern(chunk, " ")
-        values = np.rint(parts.flatten().cast(pa.float64()).to_numpy() * units)
-        if not ((values >= 0) & (values <= np.iinfo(kind).max)).all():
+        values = parts.flatten().cast(pa.float64()).to_numpy()
+        if not ((values >= 0) & (values <= most)).all():
             raise ValueError(f"a number is out of range among {len(values)}")
         starts = parts.offsets.to_numpy()
-        units_of_cells = pa.array(values.astype(kind))
-        lists.append(pa.ListArray.from_arrays(pa.array(starts - starts[0]), units_of_cells))
+        units = pa.array(units_of(values))
+        lists.append(pa.ListArray.from_arrays(pa.array(starts - starts[0]), units))
     return pa.chunked_array(lists)

@@ -95,7 +95,7 @@ def test_views_with_sectors_and_ranges_have_a_likelihood_elsewhere() -> None:
     numbers = [2 * math.log(mean / (1 + mean)) - math.log(1 + mean) for mean in (10.0, 2.5)]
     expected = whole + numbers[1] - numbers[0] + 2 * math.log(4.0)
     assert background_loglik(FEW, part) == pytest.approx(expected)
-    ranged = replace(view, ranges=np.array([FEW.table.reach, math.nan]))
+    ranged = replace(view, ranges=np.array([FEW.table.scale.reach, math.nan]))
     assert background_loglik(FEW, ranged) == pytest.approx(whole + math.log(2.0))
 
 
