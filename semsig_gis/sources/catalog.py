@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 # TOML files in the same folder that are not catalogues: classes, keywords and more.
 NO_CATALOGS = frozenset({"drift", "geofabrik", "keywords", "phrases", "taxonomy"})
+PAPER_CLASSES = 11
 MEASURES = ("range_m", "height_m", "height_sigma")
 MAX_MERGING_M = 100.0
 
@@ -60,9 +61,9 @@ class CatalogFile(FileTable):
     ranges : mapping of str to float
         Distances in metres from which classes are visible.
     titles : mapping of str to str
-        Titles of the paper's classes that fit the data better than the usual ones.
+        Titles of classes that fit the data better than the usual ones.
     classes : tuple of ObjectClass
-        Classes that the paper does not have.
+        Classes that are not built in.
     """
 
     name: str
@@ -94,7 +95,7 @@ class Catalog(Displayed):
     name, title : str
         Short name, and the one to show to people.
     taxonomy : Taxonomy
-        The paper's classes and the catalogue's own.
+        The paper's classes, the built-in classes that its layers use, and its own.
     layers : tuple of LayerSpec
         The layers.
     metric_crs : str, optional
@@ -181,9 +182,7 @@ def paper_taxonomy() -> Taxonomy:
     >>> paper_taxonomy().by_symbol("D").name
     'street_light'
     """
-    source = data_folder() / "taxonomy.toml"
-    content = parse_toml(source.read_text(encoding="utf-8"), "taxonomy.toml")
-    return Taxonomy(tuple(ObjectClass(**item) for item in content["classes"]))
+    return Taxonomy(built_in_taxonomy().classes[:PAPER_CLASSES])
 
 
 def catalog_names() -> tuple[str, ...]:
@@ -206,9 +205,12 @@ def _shipped() -> dict[str, Path | Traversable]:
     }
 
 
+@functools.cache
 def built_in_taxonomy() -> Taxonomy:
-    """Return the classes of all built-in catalogues."""
-    return combine_catalogs([load_catalog(name) for name in sorted(_shipped())]).taxonomy
+    """Return all classes that come with the package, by code: the paper's eleven first."""
+    source = data_folder() / "taxonomy.toml"
+    content = parse_toml(source.read_text(encoding="utf-8"), "taxonomy.toml")
+    return Taxonomy.from_list(content["classes"])
 
 
 def load_catalog(name: str | Path) -> Catalog:
@@ -223,9 +225,9 @@ def load_catalog(name: str | Path) -> Catalog:
     Returns
     -------
     Catalog
-        The catalogue; its taxonomy is the paper's classes followed by its own. CatalogError if the
-        file is missing or not TOML, has an unknown key, lacks a required key, or names an unknown
-        class or CRS.
+        The catalogue; its taxonomy is the paper's classes, the built-in classes that its layers
+        use, and its own. CatalogError if the file is missing or not TOML, has an unknown key,
+        lacks a required key, or names an unknown class or CRS.
 
     Examples
     --------
@@ -340,10 +342,10 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     file = read_table(CatalogFile, _with_inherited(content), where)
     place = where
     try:
+        taxonomy = _classes_used(file)
         place = f"{where}, titles"
-        taxonomy = paper_taxonomy().with_titles(dict(file.titles))
+        taxonomy = taxonomy.with_titles(dict(file.titles))
         place = where
-        taxonomy = taxonomy.extended(file.classes)
         if file.metric_crs is not None:
             require_metric_crs(file.metric_crs)
         place = f"{where}, conflate"
@@ -351,7 +353,8 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
             taxonomy.by_name(name)
         place = f"{where}, ranges"
         ranges = dict(file.ranges)
-        double = next((name for name in ranges if taxonomy.by_name(name).range_m is not None), None)
+        own = [item.name for item in file.classes if item.range_m is not None]
+        double = next((name for name in own if name in ranges), None)
         taxonomy = taxonomy.with_ranges(ranges)
         for spec in file.layers:
             place = f"{where}, layer {spec.name!r}"
@@ -374,12 +377,21 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     return Catalog(**values)
 
 
+def _classes_used(file: CatalogFile) -> Taxonomy:
+    """Return the paper's classes, the built-in classes of a file's layers by code, and its own."""
+    own = {item.name for item in file.classes}
+    used = {name for spec in file.layers for name in spec.classes} - own
+    built_in = built_in_taxonomy().classes[PAPER_CLASSES:]
+    more = [item for item in built_in if item.name in used]
+    return paper_taxonomy().extended([*more, *file.classes])
+
+
 def catalog_schema() -> dict[str, Any]:
     """Return the JSON Schema of catalogues, ``catalog.schema.json``."""
     schema = json_schema(CatalogFile, described_by=Catalog)
     layer = schema["$defs"]["LayerSpec"]["properties"]
     del layer["reader"]  # all layers of a catalogue have its reader
-    layer["class"]["examples"] = [item.name for item in paper_taxonomy().classes]
+    layer["class"]["examples"] = [item.name for item in built_in_taxonomy().classes]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
