@@ -16,7 +16,7 @@ from semsig_gis.core import (
     Displayed,
     FileTable,
     InputError,
-    ObjectClass,
+    ObjectClass,  # noqa: TC001 - of fields
     Taxonomy,
     Text,
     Texts,  # noqa: TC001 - of fields

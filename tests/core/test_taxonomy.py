@@ -62,7 +62,10 @@ BAD_NAMES = ("", "Tree", "tree-1", "1tree", "arbre à fruits", "tree\n", 7)
     ("attribute", "value", "words"),
     [
         *(("code", bad, ("'tree'", f"code = {bad!r}", "1 to 255")) for bad in BAD_CODES),
-        *(("symbol", bad, ("'tree'", f"symbol = {bad!r}", "one letter or digit")) for bad in BAD_SYMBOLS),
+        *(
+            ("symbol", bad, ("'tree'", f"symbol = {bad!r}", "one letter or digit"))
+            for bad in BAD_SYMBOLS
+        ),
         *(("name", bad, (repr(bad), "lower-case")) for bad in BAD_NAMES),
     ],
 )

@@ -174,13 +174,13 @@ def test_classes_are_read_from_a_column() -> None:
 
 
 def test_classes_of_ones_own_are_added_by_name() -> None:
-    frame = points(kind=["bench", "statue", "rune_stone", None])
-    advice = "new_classes=['statue', 'rune_stone']"
-    with refused(InputError, "'statue'", advice):
+    frame = points(kind=["bench", "gargoyle", "rune_stone", None])
+    advice = "new_classes=['gargoyle', 'rune_stone']"
+    with refused(InputError, "'gargoyle'", advice):
         objects_from_frame(frame, class_column="kind")
-    objects = objects_from_frame(frame, class_column="kind", new_classes=["statue", "rune_stone"])
-    assert objects.to_geodataframe()["class_name"].tolist() == ["bench", "statue", "rune_stone"]
-    view = "statue at 10, rune stone at 90"
+    objects = objects_from_frame(frame, class_column="kind", new_classes=["gargoyle", "rune_stone"])
+    assert objects.to_geodataframe()["class_name"].tolist() == ["bench", "gargoyle", "rune_stone"]
+    view = "gargoyle at 10, rune stone at 90"
     assert len(localize(build_database(objects), view).query) == 2
     with refused(InputError, "'Statue'", "lower-case"):
         objects_from_frame(points(kind=["Statue"]), class_column="kind")
