@@ -17,20 +17,22 @@ from sentences import refused
 from semsig_gis.core import (
     BEARING_UNITS,
     DISTANCE_UNITS,
+    FAMILIES,
     EmptyResultError,
     GridSpec,
+    ObjectClass,
     ObjectIndex,
     SignatureSpec,
+    Taxonomy,
 )
 from semsig_gis.database import ObjectStore, build_database, save_with_store
 from semsig_gis.objects import Licence, StreetObjects
-from semsig_gis.sources import load_catalog
+from semsig_gis.sources import load_catalog, paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from semsig_gis.core import Taxonomy
     from semsig_gis.database import SignatureDatabase
 
 TAXONOMY = load_catalog("montpellier").taxonomy
@@ -227,3 +229,20 @@ def contents(folder: Path) -> dict[str, bytes]:
         for path in sorted(folder.rglob("*"))
         if path.is_file() and path.name not in {"timing.json", "times.json"}
     }
+
+
+def many_classes(a_family: int = 8) -> Taxonomy:
+    """Return the paper's classes, and `a_family` more of every family."""
+    letters = map(chr, (*range(0x410, 0x450), *range(0x100, 0x180)))
+    kinds = ((name, number) for name in FAMILIES for number in range(a_family))
+    return Taxonomy(
+        (
+            *paper_taxonomy().classes,
+            *(
+                ObjectClass(
+                    code, next(letters), f"{name}_{number}", f"{name} {number}", family=name
+                )
+                for code, (name, number) in enumerate(kinds, start=90)
+            ),
+        )
+    )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from semsig_gis.core.pictograms import GENERAL_PICTOGRAM
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Collection, Mapping
 
     from semsig_gis.core.taxonomy import Taxonomy
 
@@ -110,29 +110,32 @@ def family_named(name: str) -> Family:
     return FAMILIES.get(name) or Family(name.replace("_", " ").capitalize() or "Other")
 
 
-def codes_by_family(taxonomy: Taxonomy, codes: Iterable[int]) -> dict[str, list[int]]:
+def codes_by_family(taxonomy: Taxonomy, codes: Collection[int]) -> dict[str, list[int]]:
     """Return class codes by family, in the order of legends; those without a family last.
+
+    Lists of classes have headings if there are several families.
 
     Parameters
     ----------
     taxonomy : Taxonomy
         The classes.
-    codes : iterable of int
+    codes : collection of int
         Codes of some of them; the order remains.
 
     Returns
     -------
     dict of str to list of int
-        Codes by the name of the family; one entry if no class has a family.
+        Codes by the name of the family; all of them by ``""`` if there are not several families.
 
     Examples
     --------
     >>> codes_by_family(demo_database.taxonomy, [3, 10])
-    {'furniture': [3, 10]}
+    {'': [3, 10]}
     """
     family_of = {item.code: item.family for item in taxonomy.classes}
     groups: dict[str, list[int]] = {name: [] for name in FAMILIES}
     for code in codes:
         groups.setdefault(family_of[code], []).append(code)
     groups[""] = groups.pop("", [])
-    return {name: members for name, members in groups.items() if members}
+    present = {name: members for name, members in groups.items() if members}
+    return present if len(present.keys() - {""}) > 1 else {"": [*codes]}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.families import codes_by_family, family_named
+from semsig_gis.core.families import family_named
 from semsig_gis.core.pictograms import GENERAL_PICTOGRAM, PICTOGRAMS
 
 if TYPE_CHECKING:
@@ -105,19 +106,15 @@ def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
     ClassSign(symbol='D', title='Street light', shape='diamond', colour='#e69f00')
     """
     ordered = sorted(taxonomy.classes, key=lambda item: item.code)
-    classes = {item.code: item for item in ordered}
-    groups = codes_by_family(taxonomy, classes)
-    plain = [code for code, item in classes.items() if item.family in PLAIN_FAMILIES]
-    places = {code: number for number, code in enumerate(plain)}
-    for name, codes in groups.items():
-        if name not in PLAIN_FAMILIES:
-            places |= {code: number for number, code in enumerate(codes)}
+    counts: Counter[str] = Counter()
 
     def sign(item: ObjectClass) -> ClassSign:
-        number, family = places[item.code], family_named(item.family)
+        plain, family = item.family in PLAIN_FAMILIES, family_named(item.family)
+        scheme = "" if plain else item.family
+        number, counts[scheme] = counts[scheme], counts[scheme] + 1
         colour = (
             COLOURS[number % len(COLOURS)]
-            if item.family in PLAIN_FAMILIES
+            if plain
             else _shade(family.colour, SHADE_STEPS[number % len(SHADE_STEPS)])
         )
         return ClassSign(
@@ -129,7 +126,7 @@ def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
             item.family,
         )
 
-    return {code: sign(item) for code, item in classes.items()}
+    return {item.code: sign(item) for item in ordered}
 
 
 def _shade(colour: str, step: float) -> str:

@@ -19,6 +19,8 @@ from semsig_gis.core import (
     CrsError,
     EmptyResultError,
     class_signs,
+    codes_by_family,
+    family_named,
 )
 from semsig_gis.objects import licenses_of
 from semsig_gis.output.html.image import mercator, packed, steps
@@ -29,7 +31,9 @@ from semsig_gis.output.html.page_elements import (
     corners_of,
     credits_part,
     escaped_text,
+    family_svg,
     finish_map,
+    folded_part,
     layers_of,
     sign_look,
     sign_svg,
@@ -39,7 +43,7 @@ from semsig_gis.output.html.page_elements import (
 from semsig_gis.storage import hilbert_order
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     import folium
     from numpy.typing import NDArray
@@ -258,11 +262,18 @@ def objects_map(
     key = f"objects{len(layers_of(page))}"
     Call("streetObjects", key, *_packed_objects(objects)).add_to(page)
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
+    families = codes_by_family(objects.taxonomy, counts)
+    group_of = {
+        code: f"objects:{family}" if len(families) > 1 else "objects"
+        for family, codes in families.items()
+        for code in codes
+    }
     for number, (code, count) in enumerate(counts.items()):
         title = escaped_text(signs[code].title)
         # The layer control shows the name as HTML; folium would render a brace as a template.
         name = f"{sign_svg(signs[code])} {title} ({count:,})".replace("{", "&#123;")
-        add_layer(page, name, "classLayer", key, number, group="objects", show=map_ is None)
+        group = group_of[code]
+        add_layer(page, name, "classLayer", key, number, group=group, show=map_ is None)
     return finish_map(
         page,
         objects if database is None else database,
@@ -307,16 +318,30 @@ def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[
 def objects_legend(objects: StreetObjects) -> str:
     """Return the legend of `objects_map` as HTML with data escaped."""
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
-    rows = "".join(
-        f"<tr><td>{sign_svg(signs[code])}</td>"
-        f"<td class='title'>{escaped_text(signs[code].title)}</td>"
-        f"<td><small>{escape(signs[code].symbol)}</small></td>"
-        f'<td class="count">{count:,}</td></tr>'
-        for code, count in counts.items()
-    )
+
+    def table(codes: Iterable[int]) -> str:
+        rows = "".join(
+            f"<tr><td>{sign_svg(signs[code])}</td>"
+            f"<td class='title'>{escaped_text(signs[code].title)}</td>"
+            f"<td><small>{escape(signs[code].symbol)}</small></td>"
+            f'<td class="count">{counts[code]:,}</td></tr>'
+            for code in codes
+        )
+        return f"<table>{rows}</table>"
+
+    families = codes_by_family(objects.taxonomy, counts)
+    parts = [
+        folded_part(
+            f"{family_svg(family)} {escape(family_named(family).title)}"
+            f" ({sum(counts[code] for code in codes):,})",
+            table(codes),
+        )
+        for family, codes in families.items()
+        if len(families) > 1
+    ]
     return (
         "<summary>Street objects</summary>"
         f"<p><b>{len(objects):,}</b> objects of {len(counts)} classes<br>"
-        f"Click one for details</p><table>{rows}</table>"
+        f"Click one for details</p>{''.join(parts) or table(counts)}"
         f"{credits_part(map(str, objects.licenses))}"
     )

@@ -23,9 +23,11 @@ from folium.utilities import JsCode
 from semsig_gis import __version__
 from semsig_gis.core import (
     VERDICTS,
+    ClassSign,
     InputError,
     across_180,
     class_signs,
+    family_named,
     nearest_name,
     place_links,
     to_degrees,
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core import ClassSign, Mark, Signature, Taxonomy
+    from semsig_gis.core import Mark, Signature, Taxonomy
     from semsig_gis.objects import StreetObjects
     from semsig_gis.observation import Photo, Sector
 
@@ -124,6 +126,8 @@ GROUPS = {
 class ScriptLayer(Call, Layer):
     """A map layer that a JavaScript function returns, in one of the `GROUPS`.
 
+    A group may have parts by family of classes, such as ``objects:shop``.
+
     A layer without a name is a part of another layer and is not listed in the layer control.
     """
 
@@ -152,7 +156,12 @@ class LayerGroups(Call):
         }
         tiles = (child for child in layers_of(map_).values() if isinstance(child, folium.TileLayer))
         groups |= {child.layer_name: "ground" for child in tiles}
-        super().__init__("layerGroups", map_, layers, GROUPS, groups)
+        titles = {}
+        for group, title in GROUPS.items():
+            parts = [part for part in groups.values() if part.startswith(f"{group}:")]
+            families = {part: family_named(part.partition(":")[2]).title for part in parts}
+            titles |= {group: title, **families}
+        super().__init__("layerGroups", map_, layers, titles, groups)
 
 
 class PageControls(Call):
@@ -538,6 +547,12 @@ def sign_svg(sign: ClassSign) -> str:
         f'<path d="{sign.pictogram}" transform="scale(.085)translate(-8-8)" fill="{sign.ink}"/>'
         "</svg>"
     )
+
+
+def family_svg(name: str) -> str:
+    """Return the sign of a family as SVG, for headings."""
+    family = family_named(name)
+    return sign_svg(ClassSign("?", family.title, "circle", family.colour, family.pictogram))
 
 
 def mark_svg(mark: Mark) -> str:

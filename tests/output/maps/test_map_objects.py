@@ -16,9 +16,9 @@ import shapely
 from map_pages import HOSTILE, LEGEND, MapPage, assert_quiet
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from worlds import random_town
+from worlds import many_classes, objects_of, random_town
 
-from semsig_gis.core import Taxonomy, class_signs, place_links
+from semsig_gis.core import Taxonomy, class_signs, codes_by_family, family_named, place_links
 from semsig_gis.localization import Method, localize
 from semsig_gis.objects import Licence, StreetObjects
 from semsig_gis.output import ground_map, localization_map, objects_map, page_of_map, to_latlon
@@ -388,3 +388,31 @@ def test_every_panel_links_to_public_maps(page: MapPage) -> None:
     assert page.panel()
     links = {link.text: link.get_attribute("href") for link in page.all(".semsig-links a")}
     assert links == place_links(43.6, 3.9)
+
+
+def test_many_classes_are_listed_by_family_and_a_box_switches_a_family(page: MapPage) -> None:
+    kinds = many_classes(2)
+    things = [
+        (*xy, item.code, "world", item.name)
+        for xy, item in zip(OBJECTS.xy.tolist(), kinds.classes, strict=False)
+    ]
+    objects = objects_of(*things, licenses=OBJECTS.licenses, taxonomy=kinds)
+    page.open(objects_map(objects))
+    families = codes_by_family(kinds, objects.class_counts)
+    assert len(families) > 10
+    headings = [family_named(name).title for name in families]
+    assert page.texts(".leaflet-control-layers .semsig-family summary") == headings
+    legend = page.texts(".semsig-legend details summary")
+    counts = [
+        f"{title} ({len(codes)})" for title, codes in zip(headings, families.values(), strict=True)
+    ]
+    assert legend[: len(counts)] == counts
+    shop = class_signs(kinds)[families["shop"][0]]
+    assert page.drawn(shop.colour, BOARD) > 0
+    box = "document.querySelector('[aria-label=\"All of Shops\"]')"
+    page.ask(f"{box}.click()")
+    assert page.drawn(shop.colour, BOARD) == 0
+    assert page.ask(f"return [{box}.checked, {box}.indeterminate]") == [False, False]
+    page.ask("document.querySelector('[data-group=\"objects:shop\"] input').click()")
+    assert page.ask(f"return [{box}.checked, {box}.indeterminate]") == [True, True]
+    assert page.drawn(shop.colour, BOARD) > 0

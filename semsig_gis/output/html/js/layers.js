@@ -102,20 +102,58 @@ window.semsig = {
       colours.push(nothing);
     }
     control._layers.sort((first, second) => rankOf(first) - rankOf(second));
+    // A group with families has a folded list for each, with a box that switches all its layers.
+    const opened = new Set();
+    const families = new Map();
+    const refresh = () => {
+      for (const [group, box] of families) {
+        const layers = control._layers.filter(({name}) => groups[name] === group);
+        const count = layers.filter(({layer}) => map.hasLayer(layer)).length;
+        box.checked = count > 0;
+        box.indeterminate = count > 0 && count < layers.length;
+      }
+    };
+    const switchAll = (group, on) => {
+      control._handlingClick = true;  // or Leaflet lists all layers again after each of them
+      for (const {layer, name} of control._layers) {
+        if (groups[name] === group) map[on ? "addLayer" : "removeLayer"](layer);
+      }
+      control._handlingClick = false;
+      control._update();
+      families.get(group).focus();
+    };
+    const boxOf = (group) => {
+      const box = control._overlaysList.querySelector(`[data-group="${group}"]`);
+      if (box) return box;
+      const [parent, family] = group.split(":");
+      if (family === undefined) {
+        const fieldset = L.DomUtil.create("fieldset", "", control._overlaysList);
+        fieldset.dataset.group = group;
+        semsig.text(fieldset, "legend", titles[group]);
+        return fieldset;
+      }
+      const line = L.DomUtil.create("div", "semsig-family", boxOf(parent));
+      const all = L.DomUtil.create("input", "", line);
+      all.type = "checkbox";
+      all.setAttribute("aria-label", `All of ${titles[group]}`);
+      families.set(group, all);
+      L.DomEvent.on(all, "change", () => switchAll(group, all.checked));
+      const list = L.DomUtil.create("details", "", line);
+      list.dataset.group = group;
+      list.open = opened.has(group);
+      L.DomEvent.on(list, "toggle", () => opened[list.open ? "add" : "delete"](group));
+      semsig.text(list, "summary", titles[group]);
+      return list;
+    };
+    map.on("overlayadd overlayremove", refresh);
     control._addItem = (item) => {
       const label = L.Control.Layers.prototype._addItem.call(control, item);
       item.layer.semsigLabel = {text: label.querySelector("span > span"), name: item.name};
       if (item.layer.semsigCount) semsig.countLayer(item.layer, item.layer.semsigCount);
       const group = groups[item.name];
       if (!group) return label;
-      const list = control._overlaysList;
-      let box = list.querySelector(`[data-group="${group}"]`);
-      if (!box) {
-        box = L.DomUtil.create("fieldset", "", list);
-        box.dataset.group = group;
-        semsig.text(box, "legend", titles[group]);
-      }
-      box.append(label);
+      boxOf(group).append(label);
+      refresh();
       if (group === "cells") {
         const input = label.querySelector("input");
         input.type = "radio";
