@@ -1,0 +1,335 @@
+"""Measure what more kinds of things on the map are worth: ``python -m benchmarks.see_more``.
+
+In real cities a person finds 70 % of the things that are seen from anywhere in a street cell,
+misnames 5 % of them, is 8 degrees out and makes up few. The likelihood method has this noise model.
+The views are from the same places for every line; what is on the map, and so in the views, grows
+from line to line. Results are written to ``benchmarks/see_more.json``, line by line. Lines that are
+there are not measured again, so that an interrupted run continues. Places are not refined.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from benchmarks._accuracy_rows import Bar
+from benchmarks._measuring import add_geodata, option_parser, read_rows, short, write_rows
+from benchmarks.views import KNOWN, NORTHS
+from semsig_gis.core import Taxonomy, wilson_interval
+from semsig_gis.database import build, open_city
+from semsig_gis.evaluation import QuerySpec, calibration_bins, draw_queries, parse_chain
+from semsig_gis.localization import (
+    DEFAULT_RULE,
+    AnswerRule,
+    LikelihoodLocator,
+    NoiseSpec,
+    build_index,
+    cell_noise,
+)
+from semsig_gis.objects import Loaded, StreetObjects, load
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from semsig_gis.core import ObjectClass, Signature
+    from semsig_gis.database import City
+
+__all__ = ["LINES", "bars", "main"]
+
+CITIES = {
+    "Helsinki": "helsinki_2019.osm.pbf",
+    "Monaco": "monaco_2022.osm.pbf",
+    "Neukölln": "neukolln_2024.osm",
+    "Marais": "paris_marais_routing.osm.pbf",
+}
+PERSON = NoiseSpec(detection=0.7, misnamed=0.05, clutter=0.2, bearing_sigma=8.0, name="person")
+# The classes that were read by default when the classes had no families.
+BEFORE = frozenset(range(1, 30)) - {23, 24, 25}
+SHOPS = frozenset({"shop", "food", "service", "worship"})
+CORNERS, JUNCTIONS, LANDMARKS = "building", "junction", "landmark"
+NEAR_M, THIN_M = DEFAULT_RULE.radius, 100.0
+PARTS = 16  # of the views of a line, for the processes
+# The targets: times the share of before, where it is low; shares; and the gap of chances.
+LOW_SHARE, TIMES, LEAST_RIGHT, MOST_GAP = 0.4, 2.0, 0.96, 0.05
+ENOUGH = 50  # answers, of which the share that is right says something
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """What is on the map: the first `steps` kinds of things, or only those of a `thin` place.
+
+    Answers within `radius` metres are right.
+    """
+
+    name: str
+    steps: int = 0
+    thin: bool = False
+    radius: float = NEAR_M
+
+    def has(self, item: ObjectClass) -> bool:
+        """Return whether a class is on the map."""
+        step = _step(item)
+        return step in THIN if self.thin else step < self.steps
+
+
+TODAY, FURNITURE, WITH_SHOPS, WITH_JUNCTIONS, EXTENDED, FAR, WITH_CORNERS = STEPS = (
+    "the classes of before",
+    "+ more furniture",
+    "+ shops, food, services and worship",
+    "+ street junctions",
+    "+ lines and areas",
+    "+ landmarks",
+    "+ building corners",
+)
+THIN = frozenset(map(STEPS.index, (WITH_JUNCTIONS, FAR, WITH_CORNERS)))
+THIN_PLACE = "only junctions, buildings and landmarks"
+LINES = (
+    *(Line(name=name, steps=number) for number, name in enumerate(STEPS, start=1)),
+    Line(name=THIN_PLACE, thin=True, radius=THIN_M),
+)
+
+
+def _step(item: ObjectClass) -> int:
+    """Return the number of the step that puts a class on the map."""
+    if item.code in BEFORE:
+        return STEPS.index(TODAY)
+    if item.tall or item.family == LANDMARKS:
+        return STEPS.index(FAR)
+    families = {CORNERS: WITH_CORNERS, JUNCTIONS: WITH_JUNCTIONS}
+    if item.family in families:
+        return STEPS.index(families[item.family])
+    if item.shape != "point":
+        return STEPS.index(EXTENDED)
+    return STEPS.index(WITH_SHOPS if item.family in SHOPS else FURNITURE)
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = option_parser("see_more", __doc__)
+    add_geodata(parser)
+    parser.add_argument("--views", type=int, default=1000, metavar="N", help="of each line")
+    parser.add_argument("--city", choices=CITIES, action="append", help="default: all of them")
+    parser.add_argument("--line", action="append", metavar="TEXT", help="only lines with this text")
+    parser.add_argument("--north", choices=NORTHS, action="append", help="default: all of them")
+    parser.add_argument("--processes", type=int, default=2)
+    options = parser.parse_args()
+    if options.geodata is None:
+        parser.error("SEMSIG_GEODATA does not name the folder of open data")
+    small = options.size == "small"
+    count = 5 if small else options.views
+    norths = options.north or list(NORTHS)
+    texts = options.line or [""]
+    lines = [line for line in LINES if any(text in line.name for text in texts)]
+    rows = read_rows(options.out)
+    for name in options.city or list(CITIES):
+        missing = [
+            (line, north)
+            for line, north in itertools.product(lines, norths)
+            if not any(_case(name, line, north, count).items() <= row.items() for row in rows)
+        ]
+        file = Path(options.geodata) / "osm" / CITIES[name]
+        for row in _rows(name, file, missing, count, options.processes) if missing else ():
+            print(_text(row), flush=True)
+            rows = sorted([*rows, row], key=_order)
+            write_rows(options.out, rows)
+    for name, bar in bars(rows):
+        print(f"{name}: {bar}")
+
+
+def _order(row: dict[str, Any]) -> tuple[int, int, int]:
+    names = [line.name for line in LINES]
+    return [*CITIES].index(row["city"]), names.index(row["line"]), [*NORTHS].index(row["heading"])
+
+
+def _case(city: str, line: Line, north: str, count: int) -> dict[str, Any]:
+    """Return the values that identify a row."""
+    values = {"city": city, "line": line.name, "heading": north}
+    return {**values, "radius": line.radius, "wanted": count}
+
+
+def _rows(
+    name: str, file: Path, missing: Sequence[tuple[Line, str]], count: int, processes: int
+) -> Iterator[dict[str, Any]]:
+    """Yield the row of each line and north of a city."""
+    loaded = load(file, selection="all")
+    everything = build(loaded, viewpoints="streets")
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool,
+    ):
+        for line, norths in itertools.groupby(missing, key=lambda pair: pair[0]):
+            path = Path(folder) / f"{LINES.index(line)}.parquet"
+            objects = _objects(loaded.objects, line)
+            if objects is None:
+                print(f"{name}, {line.name}: nothing of this is on the map")
+                continue
+            chosen = Loaded(
+                objects=objects,
+                report=loaded.report,
+                conflation=loaded.conflation,
+                buildings=loaded.buildings,
+                streets=loaded.streets,
+            )
+            city = build(chosen, path, viewpoints="streets")
+            for _, north in norths:
+                questions = _questions(city, everything, north, count)
+                parts = [questions[start::PARTS] for start in range(min(PARTS, count))]
+                answer = functools.partial(_answers, str(path), north, line.radius)
+                answers = pd.concat(pool.map(answer, parts))
+                yield {
+                    **_case(name, line, north, count),
+                    "objects": len(objects),
+                    "classes": len(city.database.present_codes),
+                    "cells": len(city.database),
+                    **_figures(answers),
+                }
+
+
+def _objects(objects: StreetObjects, line: Line) -> StreetObjects | None:
+    """Return the objects of the classes of a line; None if there are none."""
+    present = set(objects.class_counts)
+    classes = [item for item in objects.taxonomy.classes if line.has(item) and item.code in present]
+    if not classes:
+        return None
+    mask = np.isin(objects.codes, [item.code for item in classes])
+    return StreetObjects(
+        table=objects.table[mask].reset_index(drop=True),
+        taxonomy=Taxonomy(tuple(classes)),
+        licenses=objects.licenses,
+        notes=objects.notes,
+    )
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class _Question:
+    """A view and its true place."""
+
+    view: Signature
+    xy: tuple[float, float]
+
+
+def _questions(city: City, everything: City, north: str, count: int) -> list[_Question]:
+    """Return views of a city from random places of all street cells that see anything at all."""
+    chain = parse_chain(f"detector:{PERSON.name}{NORTHS[north][0]}", noises={PERSON.name: PERSON})
+    each = min(count, len(everything.database))
+    spec = QuerySpec(
+        number=each,
+        seeds=tuple(range(math.ceil(count / each))),
+        seen_from="anywhere",
+        distortions=chain,
+    )
+    queries = draw_queries(
+        city.database,
+        spec,
+        store=everything.store,
+        city=everything.database,
+        part=slice(count),
+    )
+    return [_Question(view=query.asked.signature, xy=query.xy) for query in queries]
+
+
+@functools.cache
+def _locator(path: str, north: str, radius: float) -> LikelihoodLocator:
+    city = open_city(path)
+    database = city.database
+    return LikelihoodLocator(
+        index=build_index(database, cell_noise(PERSON, database.grid.step)),
+        north_sigma=NORTHS[north][1],
+        rule=AnswerRule(threshold=DEFAULT_RULE.threshold, radius=radius),
+        top=1,
+        surely_here=True,
+    )
+
+
+def _answers(path: str, north: str, radius: float, questions: Sequence[_Question]) -> pd.DataFrame:
+    """Return the outcomes of questions, one row each; those without any object have no answer."""
+    locator = _locator(path, north, radius)
+    rows = []
+    for question in questions:
+        row = {"seen": float(len(question.view)), "right": 0.0, "chance": 0.0}
+        if len(question.view):
+            location = locator.locate(question.view)
+            error = math.dist((location.answer.x, location.answer.y), question.xy)
+            row |= {
+                "right": float(round(error, 6) <= radius),
+                "chance": location.answer.mass,
+                "region_m2": 1e6 * location.region_km2,
+            }
+        rows.append(row)
+    return pd.DataFrame(rows, columns=["seen", "right", "chance", "region_m2"])
+
+
+def _figures(answers: pd.DataFrame) -> dict[str, Any]:
+    """Return the figures of a line; ``gap`` is how far off the chances are, on the average."""
+    seen = answers[answers["seen"] > 0]
+    sure = answers["right"][answers["chance"] >= DEFAULT_RULE.threshold]
+    near = float(answers["right"].mean())
+    low, high = wilson_interval(near, len(answers))
+    gap = None
+    if len(seen):
+        tenths = calibration_bins(seen)
+        gaps = (tenths["stated"] - tenths["true"]).abs() * tenths["n"]
+        gap = float(gaps.sum() / tenths["n"].sum())
+    return {
+        "queries": len(answers),
+        "detections": short(answers["seen"].mean()),
+        "blind": short(float((answers["seen"] == 0).mean())),
+        "near": short(near),
+        "near_low": short(low),
+        "near_high": short(high),
+        "answered": len(sure),
+        "right": int(sure.sum()),
+        "stated": short(float(answers["chance"].mean())),
+        "gap": short(gap),
+        "region_m2": short(float(seen["region_m2"].median())) if len(seen) else None,
+    }
+
+
+def _text(row: dict[str, Any]) -> str:
+    """Return a row as text."""
+    gap = "" if row["gap"] is None else f", chances {row['gap']:.3f} off"
+    region = "" if row["region_m2"] is None else f", region {row['region_m2']:,.0f} m²"
+    return (
+        f"{row['city']}, {row['line']}, north {row['heading']} (n={row['queries']}): within "
+        f"{row['radius']:g} m {row['near']:.3f} [{row['near_low']:.3f}, {row['near_high']:.3f}], "
+        f"answered {row['answered']}, right {row['right']}{gap}{region}, "
+        f"{row['detections']:.1f} detections, {row['blind']:.3f} without any"
+    )
+
+
+def bars(rows: Sequence[dict[str, Any]]) -> Iterator[tuple[str, Bar]]:
+    """Yield the bars of rows of ``see_more.json``, each with its city."""
+    for city in dict.fromkeys(row["city"] for row in rows):
+        of_city = [row for row in rows if row["city"] == city]
+        shares = {row["line"]: row["near"] for row in of_city if row["heading"] == KNOWN}
+        if {TODAY, WITH_JUNCTIONS} <= shares.keys() and shares[TODAY] < LOW_SHARE:
+            ratio = shares[WITH_JUNCTIONS] / shares[TODAY] if shares[TODAY] else math.inf
+            yield city, Bar(what=f"{WITH_JUNCTIONS}, to {TODAY}", value=ratio, low=TIMES)
+        enough = [row for row in of_city if row["answered"] >= ENOUGH]
+        if enough:
+            least = min(row["right"] / row["answered"] for row in enough)
+            yield city, Bar(what="right, of the answers of any line", value=least, low=LEAST_RIGHT)
+        gaps = [row["gap"] for row in of_city if row["gap"] is not None]
+        if gaps:
+            yield (
+                city,
+                Bar(what="chances off, at most, in any line", value=max(gaps), high=MOST_GAP),
+            )
+        for row in of_city:
+            if row["line"] == THIN_PLACE and row["heading"] == KNOWN:
+                value = row["answered"] / row["queries"]
+                yield city, Bar(what=f"answered, {THIN_PLACE}", value=value, low=1 / row["queries"])
+
+
+if __name__ == "__main__":
+    main()
