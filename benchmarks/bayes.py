@@ -163,7 +163,7 @@ class ExactPosterior:
         errors = signed_degrees(view.bearings - self._views.bearings[:, None])
         near = np.abs(errors) < 8.0 * sigma
         hits = np.where(near, norm.pdf(errors / sigma) / sigma, 0.0)
-        hits *= table.detected[0, kinds][:, None] * table.named[0][kinds][:, table.query_rows(view)]
+        hits *= table.detected[0, kinds][:, None] * table.named(0)[kinds][:, table.query_rows(view)]
         if view.ranges is not None:
             distances = np.maximum(self._views.distances, table.distances[0])[:, None]
             hits *= norm.pdf(np.log(view.ranges / distances) / RANGE_ERROR) / RANGE_ERROR

@@ -244,7 +244,7 @@ def scene_of(
         things.append(
             Thing(
                 chance=detected * inside,
-                names=table.named[row, kind].tolist(),
+                names=table.named(row)[kind].tolist(),
                 bearing=bearing,
                 bearing_sigma=min(math.hypot(float(table.sigma[kind]), turned), 180.0),
                 distance=metres,

@@ -118,6 +118,7 @@ from .locator import make_locator as make_locator
 from .locator import method_index as method_index
 from .locator import parse_method as parse_method
 from .locator import usual_noise as usual_noise
+from .noise.families import noise_by_class as noise_by_class
 from .noise.levels import Level as Level
 from .noise.levels import level_mixture as level_mixture
 from .noise.model import Noise as Noise

@@ -189,8 +189,15 @@ def _write_columns(  # noqa: PLR0917 - a private helper of one caller
 ) -> float:
     """Fill `columns`, shape (blocks, k, 72, BLOCK_CELLS), and return the size of their steps."""
     spread_of, spread = spreads
+    # The chance of each name, and 1 for an unknown class, over the density of false objects.
+    naming = np.empty((*table.misnamed.shape, len(table.density)), np.float32)
+    odds_of_name = 0.0
+    for length, own in enumerate(naming):
+        names = np.append(table.named(length), np.ones((len(own), 1)), axis=1) / table.density
+        odds_of_name = max(odds_of_name, float((table.odds[length, :, None] * names).max()))
+        own[:] = names
     # 255 steps are enough for four objects in one direction.
-    peak = float(spread.max() * (table.odds[:, :, None] * table.naming).max())
+    peak = float(spread.max()) * odds_of_name
     step = math.log1p(4.0 * peak) / 255.0
     objects = DetectedObjects(
         offsets=database.offsets,
@@ -200,7 +207,7 @@ def _write_columns(  # noqa: PLR0917 - a private helper of one caller
         odds=odds.astype(np.float32),
         leaving=leaving.astype(np.float32),
     )
-    naming, logs = table.naming.astype(np.float32), _logs(step)
+    logs = _logs(step)
     lines = -(-len(database) // LINE_CELLS)
     parts = [
         np.array([low, min(low + LINES_A_TASK, lines)]) for low in range(0, lines, LINES_A_TASK)

@@ -288,7 +288,7 @@ class SimulatedDetector:
         detections = sight.only(rng.random(len(sight)) < chances)
         # Classification: a random row of the cumulative confusion matrix.
         kinds = table.row_of[detections.codes]
-        names = np.cumsum(table.named[length, kinds], axis=1)
+        names = np.cumsum(table.named(length)[kinds], axis=1)
         labels = (rng.random(len(detections))[:, None] * names[:, -1:] >= names).sum(axis=1)
         noise = rng.normal(0.0, table.sigma[kinds])
         return replace(

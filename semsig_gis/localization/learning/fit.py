@@ -249,8 +249,9 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
     of_pairs = of_detections[pairs.detections]
     chances = association.chances * of_pairs
     # The scores of a detection may be those of several classes.
-    naming = sum_products("kc,cn->kn", model.named[0], detections.scores)[kind, pairs.detections]
-    own = model.named[0].diagonal()[kind] * detections.scores[kind, pairs.detections]
+    names = model.named(0)
+    naming = sum_products("kc,cn->kn", names, detections.scores)[kind, pairs.detections]
+    own = names.diagonal()[kind] * detections.scores[kind, pairs.detections]
     cells = kind * count + pairs.detections
     by_detection = np.bincount(cells, chances / naming, size * count).reshape(size, -1)
     true = np.bincount(pairs.detections, association.chances, count)
@@ -260,7 +261,7 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
     hits, trials = of_objects[:, None] * _detected_objects(evidence, association, model)
     turns = of_pairs * _bearing_errors(evidence, association, model)
     ranges = of_pairs * _range_errors(evidence, association, model)
-    names = model.named[0] * sum_products("kd,cd->kc", by_detection, detections.scores)
+    named = names * sum_products("kd,cd->kc", by_detection, detections.scores)
     amounts = [(kind, row) for row in (*turns, *ranges)]
     amounts += [(evidence.kinds, row) for row in (*hits.T, *trials.T)]
     sums = [np.bincount(kinds, row, size) for kinds, row in amounts]
@@ -272,8 +273,8 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
         hits=hits,
         trials=trials,
         false=false.T,
-        named=names,
-        totals=np.column_stack([names, false.sum(axis=1), *sums]),
+        named=named,
+        totals=np.column_stack([named, false.sum(axis=1), *sums]),
         log_likelihood=float(logliks.sum()),
     )
 

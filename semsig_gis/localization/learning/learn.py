@@ -498,7 +498,7 @@ def _spec(
         misnamed=overall["misnamed"],
         confusion={
             name: by_class(row / row.sum())
-            for name, row in zip(evidence.names, model.named[0], strict=True)
+            for name, row in zip(evidence.names, model.named(0), strict=True)
         },
         clutter=clutter,
         clutter_shares=by_class(model.clutter / clutter),

@@ -12,6 +12,7 @@ import numpy as np
 
 from semsig_gis.core import Displayed, InputError, check_fields, number, read_table
 from semsig_gis.localization.learning.fit import LEAST, MOST, shrunk_rates
+from semsig_gis.localization.noise.families import noise_by_class
 from semsig_gis.objects import ClassChange  # noqa: TC001 - of fields
 from semsig_gis.sources import data_folder
 from semsig_gis.storage import parse_toml, read_values
@@ -269,7 +270,8 @@ def aged_noise(
         changed = ageing.spec(spec, detection, ageing.clutter(spec) + ageing.additions)
         return replace(changed, position_sigma=sigma)
 
-    return replace(noise.changed(older), name=f"{years:g}-year-old map with {noise.name}")
+    by_class = noise_by_class(noise, database.taxonomy, set(database.present_codes.tolist()))
+    return replace(by_class.changed(older), name=f"{years:g}-year-old map with {noise.name}")
 
 
 def fresh_noise(
@@ -312,6 +314,7 @@ def fresh_noise(
     if years == 0:
         return spec
     ageing = _Ageing.of(drift or named_drift(), years, database)
+    (spec,) = noise_by_class(spec, database.taxonomy, set(database.present_codes.tolist())).specs
     remaining = np.maximum(1.0 - ageing.removals, LEAST)
     detection = np.minimum(ageing.detection(spec) / remaining, MOST)
     clutter = np.maximum(ageing.clutter(spec) - ageing.additions, LEAST / len(ageing.names))

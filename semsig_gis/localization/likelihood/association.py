@@ -204,7 +204,9 @@ def associate(
     # By detection: the density of clutter, and of objects that come into range in any direction,
     # as many as leave it.
     used_rows, row = np.unique(rows, return_inverse=True)
-    name_chances = sum_products("lkc,cn->lkn", table.named[used_rows], photos.scores)
+    name_chances = np.stack(
+        [sum_products("kc,cn->kn", table.named(used), photos.scores) for used in used_rows.tolist()]
+    )
     leaving = np.zeros((len(views), len(table.codes)))
     np.add.at(leaving, (owners, kinds), near * table.leaving[kinds, units])
     names = name_chances[row[photos.photo_rows], :, np.arange(len(photos.photo_rows))]

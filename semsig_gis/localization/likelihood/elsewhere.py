@@ -168,7 +168,7 @@ def _density(database: SignatureDatabase, table: NoiseTable, cell: int) -> NDArr
     part = slice(database.offsets[cell], database.offsets[cell + 1])
     kinds, units = table.row_of[database.codes[part]], database.distance_units[part]
     length = min(len(kinds), len(table.detected) - 1)
-    near, names = table.detected[length, kinds], table.named[length, kinds]
+    near, names = table.detected[length, kinds], table.named(length)[kinds]
     bearings = database.bearing_units[part, None] * (FULL_TURN / BEARING_UNITS)
     away = signed_degrees(BINS - bearings) / table.sigmas[kinds, units][:, None]
     peaks = np.exp(-0.5 * away**2)

@@ -242,7 +242,8 @@ class LikelihoodIndex(Displayed):
             self.table.row_of,
             np.bincount(rows, minlength=len(self.table.codes) + 1),
             self.table.detected,
-            self.table.named,
+            self.table.misnamed,
+            self.table.others,
             self.table.clutter,
             distinct,
         )

@@ -428,7 +428,8 @@ def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
     row_of: NDArray[np.int64],
     query: NDArray[np.int64],
     detected: NDArray[np.float64],
-    naming: NDArray[np.float64],
+    misnamed: NDArray[np.float64],
+    others: NDArray[np.float64],
     clutter: NDArray[np.float64],
     scores: NDArray[np.float32],
 ) -> None:
@@ -436,8 +437,9 @@ def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
 
     Fills `scores`, shape (d,), with log-likelihoods. `query`, shape (k + 1,), counts the objects
     of the query by class, those of unknown class last. By length and class, `detected` is the
-    chance of detection and `naming`, shape (longest + 1, k, k), that of each name; `clutter` is the
-    expected number of false objects in a signature, and `row_of` the row of each class code.
+    chance of detection and `misnamed` that of another name, with shares `others`, shape (k, k);
+    `clutter` is the expected number of false objects in a signature, and `row_of` the row of each
+    class code.
     """
     kinds = len(clutter)
     most = 0
@@ -462,10 +464,11 @@ def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
             stray = clutter[name]  # expected detections of other things under this name
             for kind in range(kinds):
                 if counts[kind] > 0 and kind != name:
-                    stray += counts[kind] * detected[length, kind] * naming[length, kind, name]
+                    named = misnamed[length, kind] * others[kind, name]
+                    stray += counts[kind] * detected[length, kind] * named
             unnamed += clutter[name] + counts[name] * detected[length, name]
             stray *= share
-            chance = share * detected[length, name] * naming[length, name, name]
+            chance = share * detected[length, name] * (1.0 - misnamed[length, name])
             own, number = counts[name], query[name]
             if stray == 0.0:
                 continue  # no class of the query is known

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.localization.noise.families import noise_by_class
 from semsig_gis.localization.noise.model import ALL
 
 if TYPE_CHECKING:
@@ -60,4 +61,5 @@ def noise_with_objects_beyond(noise: Noise, database: SignatureDatabase) -> Nois
             fading={name: fading[name] for name in fading if name != ALL},
         )
 
-    return noise.changed(change)
+    plain = noise_by_class(noise, database.taxonomy, set(present.tolist()))
+    return plain.changed(change)

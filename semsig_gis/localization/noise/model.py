@@ -120,8 +120,8 @@ class NoiseSpec(Displayed):
     detection : float, default 0.9
         Chance that an object in range is detected, 0 to 1.
     misnamed : float, default 0.05
-        Share of the detected objects that are given another class, each other class with equal
-        chance; 0 to 1.
+        Share of the detected objects that are given another class, 0 to 1: seven in ten of them
+        one of the other classes of the family, and the others any class, each with equal chance.
     confusion : mapping of str to mapping of str to float, optional
         For some or all classes the chance of each class that a detected object is given, the
         right one included; each row sums to one. It takes precedence over `misnamed`.
@@ -132,7 +132,9 @@ class NoiseSpec(Displayed):
     bearing_sigma : float, default 5.0
         Standard deviation of a bearing in degrees, above 0 and up to 180.
     detection_by_class, misnamed_by_class, bearing_sigma_by_class : mapping of str to float
-        The same for single classes, by the name of the class; optional.
+        The same for single classes or families, by name; optional. In all tables by class, an entry
+        of a family is for its classes without an entry of their own, and its share is divided
+        equally among them.
     position_sigma : float, default 0.0
         Standard deviation in metres of the place of the observer, in x and in y; it turns the
         bearings of near objects more than those of far objects.

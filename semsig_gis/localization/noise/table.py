@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import DISTANCE_UNITS, WILDCARD, DistanceScale, InputError, nearest_name
+from semsig_gis.core import DISTANCE_UNITS, WILDCARD, DistanceScale, InputError
+from semsig_gis.localization.noise.families import noise_by_class
 from semsig_gis.localization.noise.model import ALL, BY_CLASS
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ MOST_MISSED = 0.95
 LEAST_CLUTTER = 1e-3
 FULL_TURN = 360.0
 WIDEST_SIGMA = 180.0
+FAMILY_SHARE = 0.7  # of the misnamed objects, that are given another class of their family
 LONGEST_TABLE = 400  # longest signature with its own chances; longer ones use the same
 
 
@@ -99,19 +101,11 @@ class NoiseTable:
         """Chance of detection over the chance of a miss, shape (longest + 1, k)."""
         return (1.0 - self.missed) / self.missed
 
-    @cached_property
-    def named(self) -> NDArray[np.float64]:
-        """Chance of each name, by length, class and name, shape (longest + 1, k, k)."""
-        names = self.misnamed[:, :, None] * self.others
-        kinds = np.arange(len(self.codes))
-        names[:, kinds, kinds] = 1.0 - self.misnamed
+    def named(self, length: int) -> NDArray[np.float64]:
+        """Return the chance of each name of each class at a length of `misnamed`, shape (k, k)."""
+        names = self.misnamed[length, :, None] * self.others
+        np.fill_diagonal(names, 1.0 - self.misnamed[length])
         return np.asarray(names)
-
-    @cached_property
-    def naming(self) -> NDArray[np.float64]:
-        """`named`, and 1 for an unknown class, over `density`, shape (..., k, k + 1)."""
-        anything = np.ones((*self.missed.shape, 1))
-        return np.asarray(np.concatenate([self.named, anything], axis=2) / self.density)
 
     @cached_property
     def row_of(self) -> NDArray[np.int64]:
@@ -182,12 +176,16 @@ def noise_tables(
     `InputError` if the model has a class that the taxonomy does not have, or gives a class no
     chance of any name in `codes`.
     """
+    noise = noise_by_class(noise, taxonomy, set(codes.tolist()))
     # Values of other classes go to a row after the last, which is dropped.
     row_of = {code: row for row, code in enumerate(codes.tolist())}
     rows = {item.name: row_of.get(item.code, len(codes)) for item in taxonomy.classes}
     ranges = taxonomy.ranges(radius)
     scale = DistanceScale.of(taxonomy, radius)
-    tables = tuple(_table(spec, rows, codes, longest, ranges[codes], scale) for spec in noise.specs)
+    others = other_classes([taxonomy.by_code(code).family for code in codes.tolist()])
+    tables = tuple(
+        _table(spec, rows, codes, longest, ranges[codes], scale, others) for spec in noise.specs
+    )
     return tables, np.asarray(noise.weights, dtype=np.float64)
 
 
@@ -202,6 +200,26 @@ def database_tables(
         longest=min(int(database.lengths.max()), LONGEST_TABLE),
         radius=database.spec.radius,
     )
+
+
+def other_classes(families: Sequence[str]) -> NDArray[np.float64]:
+    """Return the share of each other class in the misnamed objects of each class, shape (k, k).
+
+    `families` are those of the classes, empty for none. `FAMILY_SHARE` is divided among the other
+    classes of the family, and the rest among the classes that are not in it. All others have equal
+    shares if there is only one family, or the class has none or is the only one of it.
+    """
+    names = np.array(families, dtype=str)
+    other = ~np.eye(len(names), dtype=np.bool_)
+    equal = other / max(len(names) - 1, 1)
+    if len({*families} - {""}) < 2:  # noqa: PLR2004 - families
+        return np.asarray(equal)
+    inside = other & (names[:, None] == names) & (names != "")
+    outside = other & ~inside
+    near, far = (np.maximum(part.sum(axis=1), 1) for part in (inside, outside))
+    shares = np.where(inside, (FAMILY_SHARE / near)[:, None], 0.0)
+    shares += np.where(outside, ((1.0 - FAMILY_SHARE) / far)[:, None], 0.0)
+    return np.where(inside.any(axis=1)[:, None], shares, equal)
 
 
 def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> NoiseTable:
@@ -271,22 +289,23 @@ def _table(  # noqa: PLR0917 - a private helper of one caller
     longest: int,
     ranges: NDArray[np.float64],
     scale: DistanceScale,
+    others: NDArray[np.float64],
 ) -> NoiseTable:
     """Return the table of one model, given the row of each class of the taxonomy."""
     count = len(codes)
     if spec.general:
-        tables = (*(getattr(spec, name) for name in BY_CLASS), spec.clutter_shares, spec.fading)
+        tables = [getattr(spec, name) for name in (*BY_CLASS, "clutter_shares", "fading")]
+        tables += [spec.confusion, *spec.confusion.values()]
         rows = dict.fromkeys(chain(*tables), count) | dict(rows)
 
     def by_class(overall: float, special: Mapping[str, float]) -> NDArray[np.float64]:
         values = np.full(count + 1, float(overall))
         for name, value in special.items():
-            values[_row(name, rows)] = value
+            values[rows[name]] = value
         return values[:count]
 
     misnamed = by_class(spec.misnamed, spec.misnamed_by_class)
-    others = np.full((count, count), 1.0 / max(count - 1, 1))
-    np.fill_diagonal(others, 0.0)
+    others = others.copy()
     for name, by_name in spec.confusion.items():
         shares = by_class(0.0, by_name)
         if shares.sum() <= 0:
@@ -295,7 +314,7 @@ def _table(  # noqa: PLR0917 - a private helper of one caller
                 "give some chance to the class itself."
             )
         shares /= shares.sum()
-        row = _row(name, rows)
+        row = rows[name]
         if row < count:
             misnamed[row] = 1.0 - shares[row]
             shares[row] = 0.0
@@ -338,15 +357,5 @@ def _fading(
         fading[:] = shares(spec.fading[ALL])
     for name, points in spec.fading.items():
         if name != ALL:
-            fading[_row(name, rows)] = shares(points)
+            fading[rows[name]] = shares(points)
     return fading[:count]
-
-
-def _row(name: str, rows: Mapping[str, int]) -> int:
-    """Return the row of a class in a noise model; raise InputError for an unknown class."""
-    if name not in rows:
-        raise InputError(
-            f"the noise model names a class {name!r} that the database does not "
-            f"have{nearest_name(name, rows)}; its classes are {', '.join(rows)}."
-        )
-    return rows[name]

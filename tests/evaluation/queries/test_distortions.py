@@ -473,7 +473,7 @@ def test_detector_has_the_rates_of_the_noise_model(noise: NoiseSpec, code: int, 
     assert result.heading == 0.0
     true = result.only(result.distances == 17.0)  # false objects seem to be anywhere else
     assert_rate(len(true), TRIALS, 1.0 - table.missed[LONGEST_TABLE, kind])
-    for name, chance in zip(table.codes, table.named[LONGEST_TABLE, kind], strict=True):
+    for name, chance in zip(table.codes, table.named(LONGEST_TABLE)[kind], strict=True):
         assert_rate(int((true.codes == name).sum()), len(true), float(min(chance, 1.0)))
     sigma = float(table.sigma[kind])
     off = np.exp(1j * np.radians(true.bearings - 90.0)).mean() if len(true) else 1.0

@@ -48,7 +48,7 @@ def slow_counts(index: LikelihoodIndex, query: list[int], cell: int) -> float:
     own = np.bincount(table.row_of[codes], minlength=len(table.codes))
     share = sum(query[:-1]) / sum(query)
     detected = own * (1 - table.missed[length])
-    names, right = table.named[length], np.diag(table.named[length])
+    names, right = table.named(length), np.diag(table.named(length))
     strays = share * (table.clutter + detected @ names - detected * right)
     chances = share * (1 - table.missed[length]) * right
     total = 0.0
