@@ -202,6 +202,8 @@ def _origin_text(spec: LayerSpec) -> str:
             " and ".join(f"{key}={'/'.join(values)}" for key, values in tags) for tags in spec.tags
         )
         return tags if spec.dataset is None else f"{spec.dataset}: {tags}"
+    if spec.derive is not None:
+        return f"computed from streets and buildings ({spec.derive})"
     files, dataset = ", ".join(spec.files), spec.dataset or spec.server_where
     return files if dataset is None else f"{dataset} ({files})"
 

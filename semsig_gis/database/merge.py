@@ -12,10 +12,8 @@ import pandas as pd
 
 from semsig_gis import __version__
 from semsig_gis.core import (
-    CLASS_CODE,
     HALF_WIDTH,
     LICENSES,
-    MERGED,
     DatabaseError,
     Displayed,
     cells_near,
@@ -25,7 +23,13 @@ from semsig_gis.database.city import open_city
 from semsig_gis.database.database import join_databases, require_same
 from semsig_gis.database.occlusion import MARGIN_M, footprints_around
 from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.objects import StreetObjects, compare_objects, join_licences, licenses_of
+from semsig_gis.objects import (
+    StreetObjects,
+    compare_objects,
+    join_licences,
+    joined_tables,
+    licenses_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -163,11 +167,8 @@ def _merged_store(first: ObjectStore, second: ObjectStore) -> tuple[ObjectStore,
     """Return a store of the objects and shapes of both, and the number of shared objects."""
     twins = compare_objects(first.objects, second.objects).same[:, 1]
     others = second.objects.table.drop(index=second.objects.table.index[twins])
-    table = pd.concat([first.objects.table, others], ignore_index=True)
-    if MERGED in table:
-        table[MERGED] = table[MERGED].fillna("")
     objects = StreetObjects(
-        table.astype({CLASS_CODE: np.uint8}),
+        joined_tables(first.objects.table, others),
         first.objects.taxonomy,
         join_licences([*first.objects.licenses, *second.objects.licenses]),
         tuple(dict.fromkeys([*first.objects.notes, *second.objects.notes])),

@@ -43,6 +43,7 @@ from .surroundings import select_role as select_role
 from .table import Licence as Licence
 from .table import StreetObjects as StreetObjects
 from .table import join_licences as join_licences
+from .table import joined_tables as joined_tables
 from .table import licenses_of as licenses_of
 from .table import objects_of as objects_of
 from .table import objects_specs as objects_specs

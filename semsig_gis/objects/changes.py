@@ -20,7 +20,13 @@ from semsig_gis.core import (
     InputError,
     number,
 )
-from semsig_gis.objects.table import Licence, StreetObjects, join_licences, layer_note
+from semsig_gis.objects.table import (
+    Licence,
+    StreetObjects,
+    join_licences,
+    joined_tables,
+    layer_note,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -222,9 +228,6 @@ def replace_layers(
     if not remains.any():
         return replace(new, taxonomy=taxonomy), (), ()
     remaining = old.table[remains]
-    table = pd.concat([remaining, new.table], ignore_index=True)
-    if MERGED in table:
-        table[MERGED] = table[MERGED].fillna("")
     old_licences = (
         Licence(licence.terms, tuple(name for name in licence.layers if name not in reloaded))
         for licence in old.licenses
@@ -234,7 +237,7 @@ def replace_layers(
     prefixes = tuple(layer_note(name, "") for name in reloaded)
     warnings = (note for note in old.notes if not note.startswith(prefixes))
     objects = StreetObjects(
-        table.astype({CLASS_CODE: np.uint8}),
+        joined_tables(remaining, new.table),
         taxonomy,
         licenses,
         tuple(dict.fromkeys([*warnings, *new.notes])),

@@ -122,7 +122,7 @@ def objects_from_frame(
     if catalog is None:
         _require_tags(frame, with_elements=not tags)
         catalog = load_catalog("openstreetmap")
-    specs = choose_layers(catalog, layers)
+    specs = [spec for spec in choose_layers(catalog, layers) if spec.derive is None]
     by_tags = tuple(spec for spec in specs if spec.reader == TAGS_READER)
     if by_tags:
         _require_tags(frame)

@@ -17,9 +17,11 @@ from semsig_gis.core import (
     CLASS_NAME,
     COUNT,
     GEOMETRY,
+    HEIGHT,
     LICENSES,
     SOURCE,
     SOURCE_ID,
+    TEXTS,
     Displayed,
     EmptyResultError,
     InputError,
@@ -30,10 +32,18 @@ from semsig_gis.core import (
 from semsig_gis.objects.conflation import ConflationReport, conflate
 from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
-from semsig_gis.objects.table import arrow_objects, layer_licences, layer_note, with_notes
+from semsig_gis.objects.table import (
+    OPTIONAL,
+    arrow_objects,
+    layer_licences,
+    layer_note,
+    with_notes,
+    without_empty,
+)
 from semsig_gis.sources import (
     READERS,
     TAGS_READER,
+    derived_layer,
     file_reader,
     find_files,
     note_outside,
@@ -204,10 +214,11 @@ def build_objects(
         SOURCE: pa.array(names.tolist(), pa.string()).take(pa.array(source[owner[rows]])),
         SOURCE_ID: ids.take(pa.array(rows)),
         COUNT: counts.astype(np.int32),
+        **_facts(parts, rows),
         GEOMETRY: points_to_wkb(xy[rows]),
     }
     objects = arrow_objects(
-        pa.table(columns),
+        without_empty(pa.table(columns)),
         xy=xy[rows],
         crs=system,
         taxonomy=taxonomy,
@@ -217,16 +228,40 @@ def build_objects(
     return objects, report
 
 
+def _facts(parts: Sequence[_Placed], rows: NDArray[np.int64]) -> dict[str, pa.Array]:
+    """Return the heights and texts of rows of all layers; layers without a column have no value."""
+    columns = {}
+    for name in (HEIGHT, *TEXTS):
+        if any(name in part.facts.column_names for part in parts):
+            kind = pa.float32() if name == HEIGHT else pa.string()
+            empty = pa.scalar(OPTIONAL[name], kind)
+            values = pa.chunked_array(
+                [
+                    chunk
+                    for part in parts
+                    for chunk in (
+                        part.facts[name].cast(kind).chunks
+                        if name in part.facts.column_names
+                        else [pa.repeat(empty, len(part.xy))]
+                    )
+                ],
+                kind,
+            )
+            columns[name] = pc.fill_null(values.take(pa.array(rows)), empty)
+    return columns
+
+
 class _Placed(NamedTuple):
     """The rows of a layer with a valid position, and the numbers of the others.
 
-    `shapes` are the geometries in the metric CRS, `xy` their centroids.
+    `shapes` are the geometries in the metric CRS, `xy` their centroids, `facts` the other columns.
     """
 
     ids: pa.Array
     codes: NDArray[np.uint8]
     xy: NDArray[np.float64]
     shapes: NDArray[np.object_]
+    facts: pa.Table
     missing: int
     misplaced: int
 
@@ -254,6 +289,7 @@ def _placed(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> _Placed:
         codes=np.array(codes, np.uint8)[classes.indices.take(rows).to_numpy()],
         xy=xy[placed],
         shapes=shapes[placed],
+        facts=layer.columns.drop_columns([CLASS_NAME, SOURCE_ID]).take(rows),
         missing=int((~usable).sum()),
         misplaced=int((~placed).sum()),
     )
@@ -445,7 +481,7 @@ def read_files(
     Returns
     -------
     layers : tuple of RawLayer
-        The layers with files, in the order of `specs`.
+        The layers with files, and those to be computed without rows, in the order of `specs`.
     absent : tuple of LayerSpec
         The layers without files in `paths`.
 
@@ -458,7 +494,7 @@ def read_files(
     ...     print(error)
     nowhere does not exist; give a file or a folder of files.
     """
-    pairs, absent = find_files(specs, paths)
+    pairs, absent = find_files([spec for spec in specs if spec.derive is None], paths)
     # A layer by tags may be in files of several formats, each with its own reader.
     reader_of = {
         path: file_reader(path) or TAGS_READER
@@ -482,6 +518,7 @@ def read_files(
         layers.extend(reader(name)(source, group_specs, filters=filters, **options))
         if progress is not None:
             progress(count, len(specs_of))
+    layers += [derived_layer(spec) for spec in specs if spec.derive is not None]
     order = {spec.name: number for number, spec in enumerate(specs)}
     return tuple(sorted(layers, key=lambda layer: order[layer.spec.name])), absent
 

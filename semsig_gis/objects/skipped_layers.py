@@ -53,4 +53,8 @@ def read_small_layers(
 
 def _others(catalog: Catalog, specs: Sequence[LayerSpec]) -> Iterator[LayerSpec]:
     names = {spec.name for spec in specs}
-    return (spec for spec in catalog.layers if spec.role == "objects" and spec.name not in names)
+    return (
+        spec
+        for spec in catalog.layers
+        if spec.role == "objects" and spec.derive is None and spec.name not in names
+    )

@@ -5,11 +5,13 @@ from __future__ import annotations
 import copy
 import functools
 import itertools
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import shapely
 
 from semsig_gis import __version__
@@ -18,11 +20,14 @@ from semsig_gis.core import (
     CLASS_NAME,
     COUNT,
     GEOMETRY,
+    GROUP,
+    HEIGHT,
     LICENSES,
     MERGED,
     NOTES,
     SOURCE,
     SOURCE_ID,
+    TEXTS,
     DatabaseError,
     Displayed,
     Taxonomy,
@@ -58,9 +63,18 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
 
 KIND = "street objects"
-NUMBERS, TEXTS = {CLASS_CODE, COUNT}, {SOURCE, SOURCE_ID, MERGED}
-# Columns without the geometry, and their types; only conflated objects have the last one.
-COLUMNS = {CLASS_CODE: np.uint8, SOURCE: str, SOURCE_ID: str, COUNT: np.int32, MERGED: str}
+# Columns without the geometry, and their types.
+REQUIRED = {CLASS_CODE: np.uint8, SOURCE: str, SOURCE_ID: str, COUNT: np.int32}
+# Columns that are there if a value is, and what stands for no value.
+OPTIONAL: dict[str, Any] = {MERGED: "", GROUP: -1, HEIGHT: math.nan, **dict.fromkeys(TEXTS, "")}
+COLUMNS = {
+    **REQUIRED,
+    MERGED: str,
+    GROUP: np.int32,
+    HEIGHT: np.float32,
+    **dict.fromkeys(TEXTS, str),
+}
+NUMBERS = {name for name, kind in COLUMNS.items() if kind is not str}
 BETWEEN_LAYERS = ", "
 BEFORE_LAYERS = ": "
 # Key of the layers of each line of ``licenses``, if the line itself is ambiguous.
@@ -111,6 +125,10 @@ class StreetObjects(Displayed):
         One row per object: ``class_code`` (uint8), ``source`` (layer name), ``source_id``,
         ``count`` (number of rows collapsed into it) and ``geometry`` (point in a metric CRS); after
         `conflate` also ``merged``, the same object in other sources: ``"source:id; source:id"``.
+        Columns that are there only if a value is: ``group`` (int32, number of the extended thing
+        that a point belongs to, or -1), ``height`` (float32, metres, or NaN), and what is written
+        on objects, empty where nothing is: ``name``, ``brand``, ``operator``, ``ref``,
+        ``house_number`` and ``street``.
     taxonomy : Taxonomy
         The classes of the codes.
     licenses : tuple of Licence
@@ -165,6 +183,30 @@ class StreetObjects(Displayed):
         }
         return pa.table({**columns, GEOMETRY: points_to_wkb(self.xy)})
 
+    @functools.cached_property
+    def groups(self) -> NDArray[np.int32] | None:
+        """Number of the extended thing of every point, or -1, shape (n,); None if none is one."""
+        if GROUP not in self.arrow.column_names:
+            return None
+        groups = whole_numbers(self.arrow[GROUP]).astype(np.int32)
+        groups.setflags(write=False)
+        return groups
+
+    @functools.cached_property
+    def heights(self) -> NDArray[np.float32] | None:
+        """Height of every object in metres, or NaN, shape (n,); None if none is known."""
+        if HEIGHT not in self.arrow.column_names:
+            return None
+        heights: NDArray[np.float32] = self.arrow[HEIGHT].to_numpy().astype(np.float32)
+        heights.setflags(write=False)
+        return heights
+
+    @property
+    def texts(self) -> pa.Table | None:
+        """The columns of what is written on the objects; None if nothing is."""
+        names = [name for name in TEXTS if name in self.arrow.column_names]
+        return self.arrow.select(names) if names else None
+
     @property
     def class_counts(self) -> dict[int, int]:
         """Number of objects by class code; classes without objects are omitted."""
@@ -213,7 +255,7 @@ class _ArrowObjects(StreetObjects):
         columns = {
             name: column.to_numpy() if name in NUMBERS else column.to_pylist()
             for name, column in zip(self.arrow.column_names, self.arrow.columns, strict=True)
-            if name in {*COLUMNS, MERGED}  # the last one is of conflated objects
+            if name in COLUMNS
         }
         return gpd.GeoDataFrame(columns, geometry=shapely.points(self.xy), crs=self.crs)
 
@@ -229,6 +271,38 @@ def arrow_objects(arrow: pa.Table, *, xy: NDArray[np.float64], **attributes: Any
     objects = _ArrowObjects.__new__(_ArrowObjects)
     vars(objects).update(attributes, arrow=arrow, codes=codes, xy=xy)
     return objects
+
+
+def without_empty(arrow: pa.Table) -> pa.Table:
+    """Return the columns of objects without the optional ones in which no object has a value."""
+    kept = {*REQUIRED, MERGED, GEOMETRY}  # conflated objects have `merged` in any case
+    return arrow.select(
+        [
+            name
+            for name in arrow.column_names
+            if name in kept or (name in COLUMNS and _has_value(arrow[name], OPTIONAL[name]))
+        ]
+    )
+
+
+def _has_value(column: pa.ChunkedArray, nothing: object) -> bool:
+    if pa.types.is_floating(column.type):
+        return not bool(pc.all(pc.is_null(column, nan_is_null=True)).as_py())
+    return bool(pc.any(pc.not_equal(column, nothing)).as_py())
+
+
+def joined_tables(first: gpd.GeoDataFrame, second: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """Return the rows of two tables of street objects; the groups of the second one are new."""
+    import pandas as pd  # noqa: PLC0415 - 0.4 s
+
+    if GROUP in first and GROUP in second:
+        numbers = second[GROUP].to_numpy()
+        shifted = np.where(numbers < 0, numbers, numbers + first[GROUP].max() + 1)
+        second = second.assign(**{GROUP: shifted})
+    table = pd.concat([first, second], ignore_index=True)
+    nothing = {name: value for name, value in OPTIONAL.items() if name in table}
+    kinds = {name: COLUMNS[name] for name in nothing if name in NUMBERS}
+    return table.fillna(nothing).astype({CLASS_CODE: np.uint8, **kinds})
 
 
 def with_notes(objects: StreetObjects, notes: tuple[str, ...]) -> StreetObjects:
@@ -263,8 +337,7 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
     """
     bounds = np.column_stack([objects.xy, objects.xy])
     rows = np.arange(len(objects)) if keep_order else hilbert_order(bounds)
-    stored = [name for name in objects.arrow.column_names if name in {*COLUMNS, GEOMETRY}]
-    arrow = objects.arrow.select(stored).take(pa.array(rows))
+    arrow = without_empty(objects.arrow).take(pa.array(rows))
     arrow = arrow.append_column(BBOX, bounds_column(bounds[rows]))
     box = (*objects.xy.min(axis=0), *objects.xy.max(axis=0))
     geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=box)
@@ -415,10 +488,14 @@ def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
 
 def _require_columns(arrow: pa.Table) -> None:
     """Raise KeyError for a missing column, TypeError for a column of another type."""
-    arrow.select([*(name for name in COLUMNS if name != MERGED), GEOMETRY])
+    arrow.select([*REQUIRED, GEOMETRY])
     for field in arrow.schema:
         kind = field.type
-        if (field.name in NUMBERS and not pa.types.is_integer(kind)) or (
-            field.name in TEXTS and kind not in {pa.string(), pa.large_string(), pa.null()}
-        ):
+        if field.name == HEIGHT:
+            valid = pa.types.is_floating(kind)
+        elif field.name in NUMBERS:
+            valid = pa.types.is_integer(kind) and not arrow[field.name].null_count
+        else:
+            valid = kind in {pa.string(), pa.large_string(), pa.null()}
+        if field.name in COLUMNS and not valid:
             raise TypeError(f"its column {field.name} contains {kind}")

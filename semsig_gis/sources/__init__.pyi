@@ -58,6 +58,7 @@ from .http.fetch import read_text as read_text
 from .layer import RawLayer as RawLayer
 from .layer import Reader as Reader
 from .layer import RowCounts as RowCounts
+from .layer import derived_layer as derived_layer
 from .layer import transform_points as transform_points
 from .layer import transformed as transformed
 from .layer_spec import ClassBy as ClassBy

@@ -31,7 +31,7 @@ from semsig_gis.core import (
     read_table,
     require_metric_crs,
 )
-from semsig_gis.sources.layer_spec import Conditions, LayerSpec  # noqa: TC001
+from semsig_gis.sources.layer_spec import Conditions, LayerSpec, TextFields  # noqa: TC001
 from semsig_gis.storage import parse_toml, read_text
 
 if TYPE_CHECKING:
@@ -58,6 +58,10 @@ class CatalogFile(FileTable):
         Files of layers that name none.
     exclusions : mapping of str to values
         What leaves a row out of every layer of objects that has no ``not``.
+    texts : mapping of str to str
+        Columns of what is written on objects, and their fields, for layers that have no ``texts``.
+    height_field, levels_field : str
+        Fields of the height and of the storeys, for layers of objects and buildings that name none.
     ranges : mapping of str to float
         Distances in metres from which classes are visible.
     titles : mapping of str to str
@@ -79,6 +83,9 @@ class CatalogFile(FileTable):
     geocoder: str | None = None
     files: Texts = ()
     exclusions: Annotated[Conditions, file_key("not")] = ()
+    texts: TextFields = ()
+    height_field: str | None = None
+    levels_field: str | None = None
     conflate: Annotated[_ByClass, pairs(Annotated[float, metres(MAX_MERGING_M)])] = ()
     ranges: Annotated[_ByClass, pairs(Annotated[float, metres(MAX_RANGE_M)])] = ()
     titles: Annotated[tuple[tuple[str, str], ...], pairs(Text)] = ()
@@ -372,7 +379,16 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     keys = file.model_fields_set & {field.name for field in dataclasses.fields(Catalog)}
     values = {key: getattr(file, key) for key in keys} | {
         "taxonomy": taxonomy,
-        "layers": tuple(dataclasses.replace(spec, reader=file.reader) for spec in file.layers),
+        "layers": tuple(
+            dataclasses.replace(
+                spec,
+                reader=file.reader,
+                extended=any(
+                    item.shape != "point" for item in taxonomy.classes if item.name in spec.classes
+                ),
+            )
+            for spec in file.layers
+        ),
     }
     return Catalog(**values)
 
@@ -390,7 +406,8 @@ def catalog_schema() -> dict[str, Any]:
     """Return the JSON Schema of catalogues, ``catalog.schema.json``."""
     schema = json_schema(CatalogFile, described_by=Catalog)
     layer = schema["$defs"]["LayerSpec"]["properties"]
-    del layer["reader"]  # all layers of a catalogue have its reader
+    # All layers of a catalogue have its reader, and the shapes of its classes.
+    del layer["reader"], layer["extended"]
     layer["class"]["examples"] = [item.name for item in built_in_taxonomy().classes]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
@@ -400,16 +417,24 @@ def _with_inherited(content: dict[str, Any]) -> dict[str, Any]:
     layers: object = content.get("layers")
     if not isinstance(layers, list):
         return content
-    shared = {key: content[key] for key in ("files", "license", "attribution") if key in content}
-    exclusions = {key: content[key] for key in ("not",) if key in content}
     return content | {
         "layers": [
-            {**shared, **(exclusions if item.get("role", "objects") == "objects" else {}), **item}
+            {key: content[key] for key in _inherited_keys(item) if key in content} | item
             if isinstance(item, dict)
             else item
             for item in layers
         ]
     }
+
+
+def _inherited_keys(layer: dict[str, Any]) -> tuple[str, ...]:
+    """Return the keys that a layer has from its catalogue if it lacks them."""
+    role = layer.get("role", "objects")
+    if "derive" in layer:
+        return "license", "attribution"
+    keys: tuple[str, ...] = ("files", "license", "attribution")
+    keys += ("not", "texts") if role == "objects" else ()
+    return (*keys, "height_field", "levels_field") if role in ("objects", "buildings") else keys
 
 
 # The same text is parsed only once.

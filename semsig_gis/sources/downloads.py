@@ -13,6 +13,7 @@ from semsig_gis.sources.clip import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.access_token import AccessToken
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
+from semsig_gis.sources.layer import derived_layer
 from semsig_gis.sources.osm import overpass
 from semsig_gis.sources.registry import READERS
 
@@ -88,7 +89,7 @@ def fetch_layers(
         http = replace(http, token=AccessToken.from_environment(catalog.token))
     layers: list[RawLayer] = []
     for layer, size in fetch(
-        specs,
+        [item for item in specs if item.derive is None],
         endpoints=catalog.endpoints,
         area=area,
         cache=cache,
@@ -99,6 +100,7 @@ def fetch_layers(
         layers.append(clip_layer(layer, area))
         rows = size or f"{len(layers[-1]):,} rows"
         remark(f"{layer.spec.name}: {rows}; {layer.spec.terms}")
+    layers += [clip_layer(derived_layer(item), area) for item in specs if item.derive is not None]
     return tuple(layers)
 
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import numpy as np
 import pyarrow as pa
 import shapely
-from pyproj import Transformer
+from pyproj import CRS, Transformer
 
-from semsig_gis.core import CrsError, Displayed
+from semsig_gis.core import CLASS_NAME, SOURCE_ID, CrsError, Displayed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from geopandas import GeoDataFrame
     from numpy.typing import NDArray
-    from pyproj import CRS
 
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.layer_spec import LayerSpec
@@ -68,7 +67,8 @@ class RawLayer(Displayed):
     columns : pyarrow.Table, optional
         One row per feature: ``class_name`` and ``source_id``. For streets also ``half_width``
         (metres from the centre line, or NaN) and ``name`` (empty if there is none), where the
-        catalogue gives widths or the field of names.
+        catalogue gives widths or the field of names. For objects also the texts, empty if there is
+        none, and for objects and buildings ``height`` (metres, or NaN), if any row has one.
     geometry : array of shapely.Geometry, optional
         The geometry of every row, shape (n,): of any type, empty, or None.
     crs : pyproj.CRS, optional
@@ -155,6 +155,18 @@ class RawLayer(Displayed):
             "unreadable": self.counts.unreadable,
             "notes": len(self.notes),
         }
+
+
+def derived_layer(spec: LayerSpec) -> RawLayer:
+    """Return a layer without rows, for objects that `assemble` computes."""
+    texts = pa.array([], pa.string())
+    return RawLayer(
+        spec=spec,
+        counts=RowCounts(read=0),
+        columns=pa.table({CLASS_NAME: texts, SOURCE_ID: texts}),
+        geometry=np.empty(0, object),
+        crs=CRS.from_epsg(4326),
+    )
 
 
 def transformed(geometry: NDArray[np.object_], old: CRS, new: CRS) -> NDArray[np.object_]:

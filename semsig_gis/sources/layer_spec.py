@@ -9,6 +9,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core import (
+    TEXTS,
     Accepts,
     CatalogError,
     Flag,  # noqa: TC001 - of fields, as the next
@@ -19,6 +20,7 @@ from semsig_gis.core import (
     file_key,
     length,
     metres,
+    nearest_name,
     number,
     pairs,
 )
@@ -31,6 +33,14 @@ if TYPE_CHECKING:
 GeometryKind = Literal["point", "line", "polygon"]
 ElementKind = Literal["node", "way", "relation"]
 Role = Literal["objects", "buildings", "streets"]
+Derivation = Literal["junctions", "dead_ends", "building_corners", "gaps"]
+DERIVED: dict[Derivation, tuple[str, ...]] = {
+    "junctions": ("t_junction", "crossroads", "large_junction", "roundabout"),
+    "dead_ends": ("dead_end",),
+    "building_corners": ("building_corner",),
+    "gaps": ("building_gap",),
+}
+"""The classes that are computed from streets and buildings."""
 # Plausible widths of a street; other numbers have another unit or another meaning.
 MIN_WIDTH_M = 0.1
 MAX_WIDTH_M = 200.0
@@ -90,6 +100,8 @@ _Tags = Annotated[
 ]
 _Count = Annotated[int, number("a number of rows", 0, whole=True)]
 _OfCatalog = Annotated[str, Accepts("it at the top, for all layers", {"type": "none"})]
+_OfClasses = Annotated[bool, Accepts("the shape of its class", {"type": "none"})]
+TextFields = Annotated[tuple[tuple[str, str], ...], pairs(Text)]
 _Width = Annotated[float, metres(MAX_WIDTH_M)]
 
 
@@ -154,6 +166,14 @@ class LayerSpec:
         For streets: the field of the width in metres, which has priority over `width_by`.
     name_field : str, optional
         For streets and buildings: the field of the name.
+    texts : tuple of (str, str)
+        For objects: columns of what is written on them (``name``, ``brand``, ``operator``, ``ref``,
+        ``house_number``, ``street``), and the fields of these.
+    height_field, levels_field : str, optional
+        For objects and buildings: the field of the height in metres, and the field of the number of
+        storeys, which gives the height where the first one does not.
+    derive : {"junctions", "dead_ends", "building_corners", "gaps"}, optional
+        What the objects of the layer are computed from, streets and buildings, instead of files.
     id_field : str, optional
         Field that identifies a row in its source; by default the number of the feature.
     unique_id : bool
@@ -185,6 +205,8 @@ class LayerSpec:
         Whether the layer is read only on request.
     reader : str
         The reader of its file.
+    extended : bool
+        Whether one of its classes is a line or an area.
     note : str
         A remark for users.
     license, attribution : str
@@ -206,6 +228,10 @@ class LayerSpec:
     width_by: WidthBy | None = None
     width_field: str | None = None
     name_field: str | None = None
+    texts: TextFields = ()
+    height_field: str | None = None
+    levels_field: str | None = None
+    derive: Derivation | None = None
     id_field: str | None = None
     geometry: GeometryKind = "point"
     crs: Annotated[str, Parsed(_crs), Accepts("a known code such as 'EPSG:4326'")] | None = None
@@ -222,6 +248,7 @@ class LayerSpec:
     role: Role = "objects"
     optional: Flag = False
     reader: _OfCatalog = "vector_file"
+    extended: _OfClasses = False
     note: str = ""
     license: str = "unknown"
     attribution: str = ""
@@ -232,8 +259,15 @@ class LayerSpec:
         return self.width_by is not None or self.width_field is not None
 
     @property
+    def has_height(self) -> bool:
+        """Whether a field gives the heights of objects or buildings."""
+        return self.height_field is not None or self.levels_field is not None
+
+    @property
     def classes(self) -> tuple[str, ...]:
         """Classes that objects of the layer may have."""
+        if self.derive is not None:
+            return DERIVED[self.derive]
         by = self.class_by
         if by is None:
             return (self.class_name,) if self.role == "objects" else ()
@@ -254,11 +288,17 @@ class LayerSpec:
         uses += [("width_by", self.width_by.field)] if self.width_by else []
         uses += [("width_field", self.width_field)] if self.width_field else []
         uses += [("name_field", self.name_field)] if self.name_field else []
+        uses += [("texts", field) for _, field in self.texts]
+        uses += [("height_field", self.height_field)] if self.height_field else []
+        uses += [("levels_field", self.levels_field)] if self.levels_field else []
         uses += [("id_field", self.id_field)] if self.id_field else []
         return tuple(uses)
 
     def check(self, taxonomy: Taxonomy) -> None:
         """Raise CatalogError or UnknownNameError if the fields do not fit each other."""
+        if self.derive is not None:
+            self._check_derived(taxonomy)
+            return
         by, is_objects = self.class_by, self.role == "objects"
         if is_objects and not self.class_name and (by is None or by.otherwise):
             raise CatalogError("the key 'class' is missing; add it.")
@@ -267,14 +307,42 @@ class LayerSpec:
         names = [name for _, name in by.classes] if by else []
         for name in [self.class_name, *names] if self.class_name else names:
             taxonomy.by_name(name)
-        for key in ("width_by", "width_field"):
-            if self.role != "streets" and getattr(self, key) is not None:
-                raise CatalogError(f"only streets have {key}; remove it or add its role.")
-        if is_objects and self.name_field is not None:
-            raise CatalogError(
-                "only streets and buildings have name_field; remove it or add its role."
-            )
+        self._check_roles()
         if self.unique_id and self.id_field is None:
             raise CatalogError("unique_id needs an id_field; name the field of the ids.")
         if not self.files and self.dataset is None:
             raise CatalogError("files = [] names no file; write file names or patterns.")
+
+    def _check_derived(self, taxonomy: Taxonomy) -> None:
+        """Raise CatalogError for keys that a layer without files cannot have."""
+        given = {"class": self.class_name, "class_by": self.class_by, "files": self.files,
+                 "tags": self.tags, "where": self.where, "not": self.exclusions,
+                 "dataset": self.dataset}  # fmt: skip
+        useless = next((key for key, value in given.items() if value), None)
+        if useless is not None or self.role != "objects":
+            raise CatalogError(
+                f"derive computes objects from streets and buildings, without "
+                f"{useless or f'the role {self.role!r}'}; remove one of them."
+            )
+        for name in self.classes:
+            taxonomy.by_name(name)
+
+    def _check_roles(self) -> None:
+        """Raise CatalogError for fields that layers of its role do not have."""
+        for key in ("width_by", "width_field"):
+            if self.role != "streets" and getattr(self, key) is not None:
+                raise CatalogError(f"only streets have {key}; remove it or add its role.")
+        if self.role == "objects" and self.name_field is not None:
+            raise CatalogError(
+                "only streets and buildings have name_field; remove it or add its role."
+            )
+        if self.texts and self.role != "objects":
+            raise CatalogError("only objects have texts; remove it, or use name_field.")
+        if self.has_height and self.role == "streets":
+            raise CatalogError("streets have no height; remove height_field and levels_field.")
+        unknown = next((column for column, _ in self.texts if column not in TEXTS), None)
+        if unknown is not None:
+            raise CatalogError(
+                f"texts has the unknown column {unknown!r}{nearest_name(unknown, TEXTS)}; "
+                f"the columns are {', '.join(TEXTS)}."
+            )

@@ -21,6 +21,8 @@ from pyproj.exceptions import CRSError
 from semsig_gis.core import (
     CLASS_NAME,
     HALF_WIDTH,
+    HEIGHT,
+    MAX_HEIGHT_M,
     NAME,
     SOURCE_ID,
     CatalogError,
@@ -139,6 +141,7 @@ GEOMETRY_TYPES = {
     "polygon": ("Polygon", "MultiPolygon"),
 }
 MOST_ERRORS = 10
+STOREY_M = 3.0
 # Number and length of the values in a note on values that class_by does not list.
 MOST_UNLISTED, MOST_VALUE_CHARACTERS = 8, 40
 # Rows with the same id get a note if they are farther apart: about a metre, by unit of the CRS.
@@ -447,9 +450,9 @@ def plain(value: object) -> object:
 class FilteredRows:
     """Rows that pass the rules of a layer, and the numbers of rows left out.
 
-    `rows` are the indices of the rows that pass, `numbers` their row numbers, `columns` their
-    class, identifier, half-width in metres and name. Rows are `filtered` by ``where`` or
-    ``class_by``, and `excluded` by ``not``.
+    `rows` are the indices of the rows that pass, `numbers` their row numbers, `columns` what
+    `RawLayer` has of them. Rows are `filtered` by ``where`` or ``class_by``, and `excluded` by
+    ``not``.
     """
 
     columns: pa.Table
@@ -487,9 +490,9 @@ class RowRules:
         self.fields = tuple(dict.fromkeys(column for _, column in uses))
 
     def apply(self, rows: Rows) -> FilteredRows:
-        """Return class, identifier, half-width in metres and name of the rows that pass.
+        """Return the columns of a `RawLayer` for the rows that pass.
 
-        An unknown half-width is NaN, and an unknown name is empty. A row without an id has its
+        A row without an id has its
         number as identifier, or an empty one where ids are unique, because the number could be the
         id of another row.
         """
@@ -528,10 +531,7 @@ class RowRules:
             result[SOURCE_ID] = pc.if_else(
                 no_id, pa.array(rows.names, pa.string()), result[SOURCE_ID]
             )
-        if spec.has_width:
-            result[HALF_WIDTH] = pa.array(self._half_widths(columns, size))
-        if spec.name_field is not None:
-            result[NAME] = _texts(columns, spec.name_field, size)
+        result |= self._facts(columns, size)
         return FilteredRows(
             pa.table(result).filter(pa.array(passed)),
             np.flatnonzero(passed),
@@ -541,16 +541,45 @@ class RowRules:
             notes=tuple(notes),
         )
 
+    def _facts(self, columns: Mapping[str, _CodedColumn], size: int) -> dict[str, pa.Array]:
+        """Return the columns other than class and identifier."""
+        spec, result = self.spec, {}
+        if spec.has_width:
+            result[HALF_WIDTH] = pa.array(self._half_widths(columns, size))
+        if spec.name_field is not None:
+            result[NAME] = _texts(columns, spec.name_field, size)
+        for column, field in spec.texts:
+            texts = _texts(columns, field, size)
+            if pc.any(pc.not_equal(texts, "")).as_py():
+                result[column] = texts
+        if spec.has_height:
+            heights = self._heights(columns, size)
+            if not np.isnan(heights).all():
+                result[HEIGHT] = pa.array(heights)
+        return result
+
     def _half_widths(self, columns: Mapping[str, _CodedColumn], size: int) -> NDArray[np.float64]:
         by, own = self.spec.width_by, self.spec.width_field
         widths = np.full(size, math.nan)
         if own is not None:
-            widths = columns[own].map(_metres, float)
+            widths = columns[own].map(_width, float)
         if by is not None:
             default = math.nan if by.default is None else by.default
             typical = columns[by.field].map(lambda value: _first(by.widths, value, default), float)
             widths = np.where(np.isnan(widths), typical, widths)
         return widths / 2
+
+    def _heights(self, columns: Mapping[str, _CodedColumn], size: int) -> NDArray[np.float32]:
+        """Return the heights in metres, from the storeys where only these are known, or NaN."""
+        own, levels = self.spec.height_field, self.spec.levels_field
+        heights = np.full(size, math.nan)
+        if levels is not None:
+            heights = STOREY_M * columns[levels].map(_metres, float)
+        if own is not None:
+            stated = columns[own].map(_metres, float)
+            heights = np.where(np.isnan(stated), heights, stated)
+        plausible = (heights > 0) & (heights <= MAX_HEIGHT_M)
+        return np.where(plausible, heights, math.nan).astype(np.float32)
 
 
 def _texts(columns: Mapping[str, _CodedColumn], field: str | None, size: int) -> pa.Array:
@@ -586,13 +615,18 @@ def _identifier(value: object) -> str:
     return whole[1] if whole else text
 
 
-def _metres(value: object) -> float:
+def _width(value: object) -> float:
     """Return a plausible width of a street from a field, or NaN."""
+    width = _metres(value)
+    return width if MIN_WIDTH_M <= width <= MAX_WIDTH_M else math.nan
+
+
+def _metres(value: object) -> float:
+    """Return a number from a field, which may be followed by m, or NaN."""
     try:
-        width = decimal(as_text(value).strip().removesuffix("m"))
+        return decimal(as_text(value).strip().removesuffix("m"))
     except ValueError:
         return math.nan
-    return width if MIN_WIDTH_M <= width <= MAX_WIDTH_M else math.nan
 
 
 def require_field(field: str, fields: Sequence[str], *, where: str, key: str) -> None:

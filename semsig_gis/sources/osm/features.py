@@ -243,7 +243,7 @@ def _frame_table(frame: gpd.GeoDataFrame) -> FeatureTable:
 @functools.cache
 def _index() -> TagIndex:
     """Return the layers of OpenStreetMap's catalogue by tag."""
-    return TagIndex(load_catalog("openstreetmap").layers)
+    return TagIndex([spec for spec in load_catalog("openstreetmap").layers if spec.tags])
 
 
 def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Iterator[FeatureTable]:
