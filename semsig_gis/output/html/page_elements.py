@@ -156,7 +156,7 @@ class LayerGroups(Call):
         }
         tiles = (child for child in layers_of(map_).values() if isinstance(child, folium.TileLayer))
         groups |= {child.layer_name: "ground" for child in tiles}
-        titles = {}
+        titles: dict[str, str] = {}
         for group, title in GROUPS.items():
             parts = [part for part in groups.values() if part.startswith(f"{group}:")]
             families = {part: family_named(part.partition(":")[2]).title for part in parts}
