@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -343,17 +344,16 @@ def _corners(location: Location) -> NDArray[np.float64]:
     middle = np.array([[place.x, place.y]])
     if not location.answer.given:
         return to_latlon(np.concatenate([middle, _viewpoints(location)]), location.crs)
+    reach = location.posterior.database.near_reach
     signs = [
         row["place"] or end
         for explanation in location.explanations[:1]
-        for row, end in zip(
-            explanation.rows,
-            explanation.ends(location.posterior.database.reach).tolist(),
-            strict=True,
-        )
+        for row, end in zip(explanation.rows, explanation.ends(reach).tolist(), strict=True)
     ]
+    # Landmarks far away would make what is near tiny.
+    shown = [sign for sign in signs if math.dist(sign, (place.x, place.y)) <= 2.0 * reach]
     around = max(SURROUNDINGS_M, 1.5 * place.ellipse()[0])
-    corners = np.concatenate([middle - around, middle + around, np.array(signs).reshape(-1, 2)])
+    corners = np.concatenate([middle - around, middle + around, np.array(shown).reshape(-1, 2)])
     margin = 0.1 * np.ptp(corners, axis=0)
     ends = np.stack([corners.min(axis=0) - margin, corners.max(axis=0) + margin])
     return to_latlon(ends, location.crs)
@@ -374,14 +374,14 @@ def _add_candidates(
     show: bool = True,
 ) -> None:
     """Add the candidates; `cells` are their rows in the database."""
-    query, spec = answer.grid_query, database.spec
+    query = answer.grid_query
     places = exact_latlon(_viewpoints(answer), database.crs)
     rows = [
         {**row, "place": place} for row, place in zip(answer.candidate_rows(), places, strict=True)
     ]
-    turns = [row.get("heading") or 0.0 for row in rows]
+    turns, reach = [row.get("heading") or 0.0 for row in rows], database.near_reach
     queries = [
-        query_signature(query, database.taxonomy, radius=spec.radius, place=place, turn=turn)
+        query_signature(query, database.taxonomy, radius=reach, place=place, turn=turn)
         for place, turn in zip(places, turns, strict=True)
     ]
     cell_views = [

@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import Identifiability
 
 
+FINE_M, COARSE_M = 1.0, 2.0  # objects so near to each other are one, by the scale of distances
 CLICK_TOLERANCE_M = 50.0  # distance from a click to the nearest cell that is described
 
 
@@ -145,9 +146,16 @@ def packed_signatures(
 ) -> dict[str, list[str]]:
     """Return signatures (types and angle levels) and the end of each cell, packed for the script.
 
-    The visible objects are added, from which the script finds exact bearings and distances.
+    The visible objects are added, from which the script finds exact bearings and distances. Those
+    of tall classes are seen from too far away for that: their entries have both.
     """
-    places, codes = _visible_objects(database)
+    tall = [item.code for item in database.taxonomy.classes if item.tall]
+    far = np.isin(database.codes, tall)
+    places, codes = _visible_objects(database, ~far)
+    landmarks = {
+        f"{name}.farBearings": packed(np.where(far, database.bearing_units, 0).astype(np.uint16)),
+        f"{name}.farUnits": packed(np.where(far, database.distance_units, 0).astype(np.uint8)),
+    }
     return {
         f"{name}.types": packed(database.codes),
         f"{name}.ends": steps(ends.astype(np.int32)),
@@ -155,24 +163,30 @@ def packed_signatures(
         f"{name}.x": steps(places[:, 0]),
         f"{name}.y": steps(places[:, 1]),
         f"{name}.classes": packed(codes),
+        **(landmarks if far.any() else {}),
     }
 
 
-def _visible_objects(database: SignatureDatabase) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+def _visible_objects(
+    database: SignatureDatabase, near: NDArray[np.bool_]
+) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     """Return places, in steps of `QUANTUM_M` from the origin, and class codes of visible objects.
 
-    They are computed from bearings and distances, so a few objects occur twice, half a metre apart.
+    They are computed from the bearings and distances of the entries that are `near`, so a few
+    objects occur twice, half a metre apart.
     """
     # Nearest first: the position of an object is most exact from the nearest cell.
-    near = np.argsort(database.distance_units, kind="stable")
-    angles = np.radians(database.bearings[near] + 0.5 * FULL_TURN / BEARING_UNITS)
-    viewpoints = np.repeat(database.xy, database.lengths, axis=0)[near]
-    away = database.distances[near, None] * np.stack([np.sin(angles), np.cos(angles)], axis=1)
-    xy, codes = viewpoints + away - np.array(database.grid.origin), database.codes[near]
-    # Keep the first occurrence of each object: key of column, row (in metres) and class.
+    rows = np.flatnonzero(near)
+    rows = rows[np.argsort(database.distance_units[rows], kind="stable")]
+    angles = np.radians(database.bearings[rows] + 0.5 * FULL_TURN / BEARING_UNITS)
+    viewpoints = np.repeat(database.xy, database.lengths, axis=0)[rows]
+    away = database.distances[rows, None] * np.stack([np.sin(angles), np.cos(angles)], axis=1)
+    xy, codes = viewpoints + away - np.array(database.grid.origin), database.codes[rows]
+    # Keep the first occurrence of each object: key of column, row and class.
     low = xy.min(axis=0, initial=np.inf)
-    columns, rows = (np.rint(part).astype(np.int64) for part in (xy - low).T)
-    keys = (columns << 32 | rows) << 8 | codes
+    grain = COARSE_M if database.scale.logarithmic else FINE_M
+    columns, lines = (np.rint(part / grain).astype(np.int64) for part in (xy - low).T)
+    keys = (columns << 32 | lines) << 8 | codes
     # Takes half the time of a sort of all keys.
     first = np.flatnonzero(~pd.Series(keys).duplicated())
     first = first[np.argsort(keys[first])]
@@ -193,8 +207,8 @@ def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str,
         "symbols": database.taxonomy.decode(np.arange(MAX_CODE + 1)),
         "step": database.grid.step,
         "tolerance": CLICK_TOLERANCE_M,
-        "sight": database.spec.radius,
-        "reach": database.reach,
+        "reach": database.near_reach,
+        "distances": np.rint(database.scale.metres).astype(int).tolist(),
         "quantum": QUANTUM_M,
         "origin": list(database.grid.origin),
         "firstColumn": int(database.columns[0]),

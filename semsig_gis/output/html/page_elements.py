@@ -419,7 +419,7 @@ def cell_signature(
     row = database.select(slice(cell, cell + 1))
     bearings = row.bearings
     look: dict[str, Any] = {
-        "reach": database.spec.radius,
+        "reach": database.near_reach,
         "metres": _whole_metres(row.distances),
         **({} if place is None else {"place": list(place)}),
     }

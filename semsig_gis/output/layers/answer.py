@@ -184,7 +184,7 @@ def answer_layers(
         licenses=licenses,
         facts=facts,
         taxonomy=answer.taxonomy,
-        reach=database.reach,
+        reach=database.near_reach,
     )
     chances = answer.candidates.get("chance")
     rank = answer.candidates.columns[0]
@@ -313,7 +313,7 @@ def explanation_rows(location: Location, explanation: Explanation) -> list[dict[
     database = location.posterior.database
     titles = {item.name: item.title for item in database.taxonomy.classes}
     titles[UNKNOWN_NAME] = "Something"
-    ends = explanation.ends(database.reach).tolist()
+    ends = explanation.ends(database.near_reach).tolist()
     return [
         {
             "verdict": row["verdict"],

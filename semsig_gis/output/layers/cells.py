@@ -104,7 +104,7 @@ def cells_layer(
         display=DISPLAY,
         styles=tuple(styles),
         taxonomy=database.taxonomy,
-        reach=database.reach,
+        reach=database.near_reach,
         cell_size=step,
         squares=functools.partial(squares_layer, database, identifiability=identifiability),
     )

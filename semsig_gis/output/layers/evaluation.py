@@ -112,7 +112,7 @@ def evaluation_facts(evaluation: Evaluation, database: SignatureDatabase) -> dic
         "licenses": database.licenses,
         "facts": {name: summary[name] for name in ("settings", "database", "versions")},
         "taxonomy": database.taxonomy,
-        "reach": database.reach,
+        "reach": database.near_reach,
     }
 
 

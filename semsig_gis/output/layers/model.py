@@ -77,7 +77,7 @@ class Layer:
     styles: tuple[Style, ...] = ()  # the first is the default
     display: Display = Display()
     taxonomy: Taxonomy | None = None  # of the symbols in its texts
-    reach: float = 1.0  # longest visibility range, metres
+    reach: float = 1.0  # longest visibility range of classes that are not tall, metres
     parts: tuple[Layer, ...] = ()  # tables with fewer columns, for a format of several layers
     cell_size: float = 0.0  # metres
     squares: Callable[[int], Layer] | None = None  # statistics by the number of cells on a side

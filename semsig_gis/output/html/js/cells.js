@@ -126,6 +126,9 @@ semsig.City = class {
     const types = this.types(name, cell);
     const span = 360 / this.grid.levels;
     const near = types ? this.around(name, cell) : [];
+    // Landmarks have bearings and distances of their own.
+    const [farUnits, farBearings] = ["farUnits", "farBearings"].map(
+      (part) => this.data[`${name}.${part}`]?.subarray(...this.part(name, cell)));
     const metres = [];
     // An object may occur twice, at slightly different places: use only one of them.
     const used = [];
@@ -133,6 +136,10 @@ semsig.City = class {
       || (other.symbol === object.symbol
         && Math.hypot(other.right - object.right, other.up - object.up) < 1.5));
     const bearings = Array.from(levels, (level, at) => {
+      if (farUnits?.[at]) {
+        metres.push(this.grid.distances[farUnits[at]]);
+        return Math.round(farBearings[at] / 20) % 360;
+      }
       const middle = (level + 0.5) * span;
       const off = ({degrees}) => Math.abs((degrees - middle + 540) % 360 - 180);
       const fit = near.filter((object) =>
@@ -142,7 +149,7 @@ semsig.City = class {
       metres.push(nearest ? Math.round(nearest.metres) : null);
       return Math.round(nearest ? nearest.degrees : middle) % 360;
     });
-    return [types, bearings, {metres, reach: this.grid.sight, place: this.middle(cell)}];
+    return [types, bearings, {metres, reach: this.grid.reach, place: this.middle(cell)}];
   }
   // The cells with the most similar counts of classes, best first: cell, difference, distance.
   mostSimilar(name, cell, count) {

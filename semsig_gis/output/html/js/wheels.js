@@ -27,10 +27,20 @@ semsig.anySign = {outline: semsig.disc, colour: "#808080",
 semsig.entries = (types, bearings, look = {}, classes = {}) => bearings.map((degrees, at) => {
   const metres = look.metres?.[at] ?? null;
   const far = metres === null ? "" : `\u00a0${metres}\u00a0m`;
+  const wide = look.extents?.[at] ? `\u00a0over\u00a0${look.extents[at]}\u00b0` : "";
   const outside = look.outside?.includes(at) ? "\u00a0(outside)" : "";
   const title = types ? (classes[types[at]] || semsig.anySign).title : null;
-  return `${title ? `${title}\u00a0` : ""}${degrees}\u00b0${far}${outside}`;
+  return `${title ? `${title}\u00a0` : ""}${degrees}\u00b0${far}${wide}${outside}`;
 });
+// The share of the radius of a wheel at which an object is drawn that is so many metres away: to
+// scale up to 60 m, and logarithmic beyond, so that near objects keep their room.
+semsig.share = (metres, reach) =>
+  (reach > 60 ? Math.log1p(metres / 10) / Math.log1p(reach / 10) : metres / reach);
+// The metres of a share of the radius, the inverse.
+semsig.metresAt = (share, reach) =>
+  (reach > 60 ? 10 * Math.expm1(share * Math.log1p(reach / 10)) : share * reach);
+semsig.lengthText = (metres) =>
+  (metres < 1000 ? `${Math.round(metres)} m` : `${(metres / 1000).toFixed(1)} km`);
 // Names of the verdicts, by the kind of comparison of two signatures.
 semsig.comparisons = {
   query: {matched: "matched", misnamed: "misnamed", missed: "missed", false: "extra"},
@@ -71,13 +81,18 @@ semsig.compare = ([types, bearings, look = {}], [others, degrees, otherLook = {}
   }));
 };
 // A signature from above: north up, every object at its bearing. The look of a view has the metres
-// to each object (null if unknown), the reach of the ring in metres, the visible sectors, and the
-// indices of the objects outside them. `comparison` has the verdict of each object.
+// to each object (null if unknown), the reach of the ring in metres, the degrees over which extended
+// things extend, the visible sectors, and the indices of the objects outside them. What is farther
+// than the reach stands outside the ring, with its distance. `comparison` has the verdict of each
+// object.
 semsig.wheel = (
   label, [types, bearings, look = {}], {classes = {}, verdicts = {}}, comparison = [],
 ) => {
   const figure = L.DomUtil.create("figure", "");
-  const drawing = semsig.svg(figure, "svg", {viewBox: "-58 -68 116 126", role: "group"});
+  const isFar = (index) => (look.metres?.[index] ?? 0) > look.reach;
+  const room = bearings.some((_, index) => isFar(index)) ? 16 : 0;
+  const drawing = semsig.svg(figure, "svg", {
+    viewBox: `${-58 - room} ${-68 - room} ${116 + 2 * room} ${126 + 2 * room}`, role: "group"});
   const places = bearings.map((degrees) => degrees * Math.PI / 180);
   const at = (angle, radius) => [radius * Math.sin(angle), -radius * Math.cos(angle)];
   const entries = semsig.entries(types, bearings, look, classes).map(
@@ -92,32 +107,50 @@ semsig.wheel = (
   semsig.svg(drawing, "circle", {r: 54, class: "ring"});
   semsig.svg(drawing, "path", {d: "M0,-67L4,-56H-4Z", class: "north"});
   semsig.svg(drawing, "circle", {r: 1.5, class: "north"});
-  const size = !types ? 3 : bearings.length <= 16 ? 6 : 5.2;
+  // The more objects, the smaller their signs.
+  const crowded = bearings.length > 16;
+  const size = !types ? 3 : crowded ? Math.max(4.1, 24 / Math.sqrt(bearings.length)) : 6;
   // With distances the drawing is to scale; what has none stands on the rim.
   const reach = 52 - 2 * size;
   if (look.metres) {
     for (const part of [0.5, 1]) {
       semsig.svg(drawing, "circle", {r: reach * part, class: "scale"});
       semsig.svg(drawing, "text", {x: 0, y: reach * part + 6.5, "font-size": 6.8, class: "scale"},
-        `${Math.round(look.reach * part)} m`);
+        `${Math.round(semsig.metresAt(part, look.reach))} m`);
     }
   }
+  // Signs that would hide each other in a crowd move along their bearings to the nearest free place.
+  const taken = [];
+  const apart = ([x, y]) => Math.min(...taken.map(([u, v]) => Math.hypot(u - x, v - y)));
+  const freeRadius = (angle, wanted) => {
+    const radii = [];
+    for (let off = 0; off < reach; off += size / 2) radii.push(wanted - off, wanted + off);
+    const inside = radii.filter((radius) => radius >= 1.5 * size && radius <= 53 - size);
+    const spots = inside.map((radius) => [radius, apart(at(angle, radius))]);
+    const [radius] = spots.find(([, space]) => space >= 2.1 * size)
+      || spots.reduce((best, spot) => (spot[1] > best[1] ? spot : best), [wanted, -1]);
+    taken.push(at(angle, radius));
+    return radius;
+  };
+  const arcs = semsig.svg(drawing, "g", {});
   // Without distances, signs that would overlap move from the rim nearer to the middle.
   const circles = [];
   for (let radius = look.metres ? 54 : 52 - size; radius > size; radius -= 2.2 * size) {
     circles.push({radius, angles: []});
   }
   places.forEach((angle, index) => {
-    const room = ({radius, angles}) => Math.min(7, ...angles.map((other) => {
+    const space = ({radius, angles}) => Math.min(7, ...angles.map((other) => {
       const turn = Math.abs(angle - other) % (2 * Math.PI);
       return Math.min(turn, 2 * Math.PI - turn);
     })) * radius;
     const metres = look.metres?.[index] ?? null;
-    const free = metres !== null
-      ? {radius: Math.min(1, metres / look.reach) * reach, angles: []}
-      : look.metres ? circles[0]
-        : circles.find((circle) => room(circle) >= 2.2 * size)
-          || circles.reduce((best, circle) => (room(circle) > room(best) ? circle : best));
+    const scaled = metres === null ? 0 : semsig.share(metres, look.reach) * reach;
+    const free = isFar(index) ? {radius: 54 + size, angles: []}
+      : metres !== null
+        ? {radius: crowded ? freeRadius(angle, scaled) : scaled, angles: []}
+        : look.metres ? circles[0]
+          : circles.find((circle) => space(circle) >= 2.2 * size)
+            || circles.reduce((best, circle) => (space(circle) > space(best) ? circle : best));
     free.angles.push(angle);
     const verdict = comparison[index]?.verdict ?? (look.outside?.includes(index) ? "outside" : "");
     const object = semsig.svg(drawing, "g", {
@@ -129,10 +162,24 @@ semsig.wheel = (
       semsig.svg(object, "line", {x1: x, y1: y, x2: outX, y2: outY, class: "ray"});
     }
     const [x, y] = at(angle, free.radius);
+    const classSign = types && (classes[types[index]] || semsig.anySign);
+    const half = (look.extents?.[index] ?? 0) * Math.PI / 360;
+    if (half) {
+      const [[fromX, fromY], [toX, toY]] = [-1, 1].map(
+        (side) => at(angle + side * Math.min(half, 3.13), free.radius));
+      semsig.svg(arcs, "path", {
+        d: `M${fromX},${fromY}A${free.radius},${free.radius} 0 ${half > 1.57 ? 1 : 0} 1 ${toX},${toY}`,
+        stroke: classSign?.colour ?? "#808080", "stroke-width": size, class: "extent"});
+    }
+    if (isFar(index)) {
+      const [textX, textY] = at(angle, free.radius + size + 6);
+      const x = textX + 6 * Math.sin(angle);
+      semsig.svg(object, "text", {x, y: textY + 2, "font-size": 6, class: "scale"},
+        semsig.lengthText(metres));
+    }
     // Smaller outside the sectors, so that they hide less.
     const own = look.metres && verdict === "outside" ? 0.65 * size : size;
     const sign = semsig.svg(object, "g", {transform: `translate(${x},${y}) scale(${own})`});
-    const classSign = types && (classes[types[index]] || semsig.anySign);
     if (verdicts[verdict]) semsig.drawFrame(sign, verdicts[verdict]);
     if (classSign) semsig.drawSign(sign, classSign, types[index]);
     else semsig.svg(sign, "circle", {r: 1, class: "north"});
