@@ -109,7 +109,7 @@ semsig.wheel = (
   semsig.svg(drawing, "circle", {r: 1.5, class: "north"});
   // The more objects, the smaller their signs.
   const crowded = bearings.length > 16;
-  const size = !types ? 3 : crowded ? Math.max(4.1, 24 / Math.sqrt(bearings.length)) : 6;
+  const size = !types ? 3 : crowded ? Math.max(4.5, 24 / Math.sqrt(bearings.length)) : 6;
   // With distances the drawing is to scale; what has none stands on the rim.
   const reach = 52 - 2 * size;
   if (look.metres) {
