@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Taxonomy
     from semsig_gis.observation.north import North
-    from semsig_gis.observation.spoken import Codes
     from semsig_gis.observation.track import Track
+    from semsig_gis.observation.vocabulary import Codes
     from semsig_gis.storage import Row
 
 Route = tuple[list[tuple[str | int, View]], list[Leg]]

@@ -25,7 +25,7 @@ from semsig_gis.core import (
 )
 from semsig_gis.observation.spoken import read_sentence
 from semsig_gis.observation.view import CLASSES, ROUNDING, Photo, View
-from semsig_gis.sources import class_code
+from semsig_gis.sources import class_codes
 from semsig_gis.storage import row_value
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import Taxonomy
-    from semsig_gis.observation.spoken import Codes
+    from semsig_gis.observation.vocabulary import Codes
     from semsig_gis.storage import Row
 
 SEEN = ("types", "bearings", "detections", "see", "photos", "signs")
@@ -52,6 +52,10 @@ GUESS_ERROR = 0.25
 THIRDS = {"near": (0, 1), "middle": (1, 2), "far": (2, 3)}
 """Rings around the viewpoint, in thirds of the visibility range of a class."""
 HEADING_ERRORS = {"known": 0.0, "unknown": math.inf}
+NO_SIGHT = (
+    "where you look is not known, so that left and right say only how things lie to each other; "
+    "say it as well, such as 'facing north'."
+)
 UNKNOWN = (None, "", "?", "nan")
 
 _NUMBER = r"[-+]?\d+(?:\.\d*)?"
@@ -73,10 +77,10 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
         The observed objects, in one of these forms: ``types`` (symbols) and ``bearings`` (degrees),
         one of which may be missing, with ``ranges``, ``range_errors`` and ``scores``;
         ``detections``, a list of mappings with ``class``, ``bearing`` or ``offset``,
-        ``bearing_error``, ``range`` and ``range_error``; ``see``, a sentence (see `read_sentence`);
-        or ``photos``, a list of rows. In addition, the direction of the photo: ``heading`` and
-        ``fov``, or ``sectors``, and ``heading_error``.
-        Other keys are ignored.
+        ``bearing_error``, ``range``, ``range_error`` and ``text``, what is written on it; ``see``,
+        a sentence (see `read_sentence`); or ``photos``, a list of rows. In addition, the direction
+        of the photo: ``heading`` and ``fov``, or ``sectors``, and ``heading_error``. Other keys are
+        ignored.
     taxonomy : Taxonomy
         The classes.
     radius : float, default 30
@@ -96,13 +100,13 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
 
     Notes
     -----
-    A class is a symbol, a name or another word (see `sources.keywords.class_code`), or a mapping of
-    these to probabilities from a detector; the rest, up to one, is for any class. A range is a
-    number of metres, ``within 12 m``, or ``near``, ``middle`` or ``far``: thirds of the visibility
-    range of the class. For these words, the distance is uniform over the disc or the ring: the view
-    has the mean and the standard deviation of its logarithm, with 25 % added for a guess. An
-    ``offset`` is in degrees to the right of the heading; without a heading, the heading is 0 and
-    the north of the photo unknown.
+    A class is a symbol, a name or another word (see `sources.class_codes`), a family, which is any
+    of its classes, or a mapping of these to probabilities from a detector; the rest, up to one, is
+    for any class. A range is a number of metres, ``within 12 m``, or ``near``, ``middle`` or
+    ``far``: thirds of the visibility range of the class. For these words, the distance is uniform
+    over the disc or the ring: the view has the mean and the standard deviation of its logarithm,
+    with 25 % added for a guess. An ``offset`` is in degrees to the right of the heading; without a
+    heading, the heading is 0 and the north of the photo unknown.
 
     Examples
     --------
@@ -162,16 +166,27 @@ def parse_seen(row: Row, *, taxonomy: Taxonomy, radius: float) -> tuple[View, Co
             f"the direction of sight was given in {values['see']!r} and as a heading of "
             f"{values['heading']}; give it once."
         )
-    values = {**values, **sentence.row}
-    keys = {name for item in values["detections"] for name in ("bearing", "offset") if name in item}
-    if len(keys) > 1 and "heading" not in values:
+    signs = [*_texts(values, "signs"), *_texts(sentence.row, "signs")]
+    values = {**values, **sentence.row, "signs": signs}
+    items = values["detections"]
+    keys = {name for item in items for name in ("bearing", "offset") if name in item}
+    if len(keys) < 2 or "heading" in values:  # noqa: PLR2004
+        values |= _columns(items, values, taxonomy)
+        view = replace(_columns_view(values, taxonomy, radius), notes=sentence.notes)
+        return view, sentence.unplaced, sentence.absent
+    if "sectors" in values:
         raise InputError(
             f"{values['see']!r} mixes directions from north (at 40, NE) with those from the "
             "direction of sight (left, 3 o'clock); say where you look as well, such as "
             "'facing north'."
         )
-    values |= _columns(values["detections"], values, taxonomy)
-    view = replace(_columns_view(values, taxonomy, radius), notes=sentence.notes)
+    # The directions from that of sight turn together, as those of a photo of unknown north.
+    parts = [[item for item in items if name in item] for name in ("bearing", "offset")]
+    views = [
+        _columns_view(shared | _columns(part, {}, taxonomy), taxonomy, radius)
+        for part, shared in zip(parts, ({"signs": signs}, {}), strict=True)
+    ]
+    view = replace(View.joined(views).turned(0.0), notes=(*sentence.notes, NO_SIGHT))
     return view, sentence.unplaced, sentence.absent
 
 
@@ -185,7 +200,7 @@ def text_row(text: str, taxonomy: Taxonomy) -> Row:
     symbols = {"?", *(item.symbol for item in taxonomy.classes)}
     if word and (symbols.issuperset(word) or (word.isalpha() and word.isupper())):
         try:
-            class_code(word, taxonomy)
+            class_codes(word, taxonomy)
         except UnknownNameError:
             return {"types": word}
     return {"see": text}
@@ -259,6 +274,8 @@ def _columns(items: Sequence[Row], values: Row, taxonomy: Taxonomy) -> Row:
         f"{name}s": [item.get(name) for item in items]
         for name in ("bearing_error", "range", "range_error")
     }
+    if any(item.get("text") is not None for item in items):
+        columns["texts"] = [item.get("text") for item in items]
     classes: list[str | Row] = []
     for value in (item.get("class") for item in items):
         if not isinstance(value, (dict, str)):
@@ -266,7 +283,9 @@ def _columns(items: Sequence[Row], values: Row, taxonomy: Taxonomy) -> Row:
                 f"the class of a detection is {value!r}; give a symbol, a word or scores by word."
             )
         if isinstance(value, str):
-            value = taxonomy.decode([class_code(value, taxonomy)])  # noqa: PLW2901 - its symbol
+            codes = class_codes(value, taxonomy)  # one, or those of a family
+            symbols = [taxonomy.decode([code]) for code in codes]
+            value = symbols[0] if len(codes) == 1 else dict.fromkeys(symbols, 1.0 / len(codes))  # noqa: PLW2901
         classes.append(value)
     if any(isinstance(value, dict) for value in classes):
         columns["scores"] = [
@@ -303,7 +322,8 @@ def _scores(chances: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:
     """Return the probability of each class code; the rest, up to one, is for any class."""
     scores = np.zeros(CLASSES)
     for word, chance in chances.items():
-        scores[class_code(word, taxonomy)] += _number(f"the score of {word!r}", chance)
+        codes = [*class_codes(word, taxonomy)]  # equal scores of those of a family
+        scores[codes] += _number(f"the score of {word!r}", chance) / len(codes)
     rest = 1.0 - scores.sum()
     if not ((scores >= 0).all() and rest >= -ROUNDING):  # false for NaN too
         raise InputError(

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import nearest_name
-from semsig_gis.sources import class_words, data_folder, other_class_words, words_of
+from semsig_gis.sources import class_words, data_folder, other_class_words, words_for, words_of
 
 if TYPE_CHECKING:
     from collections.abc import Container, Mapping, Sequence
 
     from semsig_gis.core import Taxonomy
+    from semsig_gis.sources import Term
 
 # Kinds of phrases, without and with a value; see `phrases.toml`.
 LISTS = (
@@ -30,6 +31,11 @@ LISTS = (
     "hours",
     "clock",
     "within",
+    "with",
+    "next",
+    "between",
+    "amid",
+    "opposite",
 )
 TABLES = ("number", "turn", "compass", "range")
 SHORT_WORD = 2
@@ -38,10 +44,11 @@ LETTERS = 3
 """Letters of the longest point of the compass, such as NNE."""
 LONGEST = 6
 """Words in the longest phrase."""
+STREET_SIGN, HOUSE_NUMBER = "street_sign", "house_number"
+"""Names of the classes of objects that are known by what is written on them."""
 
 Words = tuple[str, ...]
-Terms = tuple[tuple[str, int, str], ...]
-"""Words for things, each with its language and class code."""
+Codes = tuple[int, ...]
 Meaning = tuple[str, Any]
 """The kind of a phrase, and its value."""
 
@@ -67,15 +74,17 @@ class Vocabulary:
 
     `classes` are class codes by the words of a thing, joined and in any form, and `others` such
     words for things that the taxonomy has no class for; `phrases` are meanings by words, `letters`
-    bearings by capitals, and `names` words for things of the language.
+    bearings by capitals, and `names` words for things of the language. `texts` are the words for a
+    street sign and a house number, each with the name of the class.
     """
 
     language: str
-    classes: Mapping[str, int]
+    classes: Mapping[str, Codes]
     phrases: Mapping[Words, Meaning]
     letters: Mapping[str, float]
     names: tuple[str, ...]
     others: Container[str]
+    texts: Mapping[str, str]
 
     @classmethod
     def of(cls, words: Sequence[str], taxonomy: Taxonomy) -> Vocabulary:
@@ -89,18 +98,18 @@ class Vocabulary:
 
         return _vocabulary(taxonomy, max(_phrases(), key=count))
 
-    def class_of(self, words: Sequence[str]) -> int | None:
-        """Return the class code for the words of a thing, None if they are for no class."""
-        names = [words_of(word) for word in words]
-        # A thing does not begin or end with an article or a letter, such as S for south.
-        if not names[0] or not names[-1] or min(len(words[0]), len(words[-1])) == 1:
-            return None
-        return self.classes.get("".join(itertools.chain(*names)))
+    def codes_of(self, words: Sequence[str]) -> Codes | None:
+        """Return the class codes for the words of a thing, None if they are for no class."""
+        return self.classes.get(_joined(words))
+
+    def text_class(self, words: Sequence[str]) -> str | None:
+        """Return the name of the class if words are for a street sign or a house number."""
+        return self.texts.get(_joined(words))
 
     def elsewhere(self, words: Sequence[str]) -> str:
         """Return the last of some words that are for a thing without a class here, or nothing."""
         for start in range(len(words)):
-            if "".join(itertools.chain(*map(words_of, words[start:]))) in self.others:
+            if _joined(words[start:]) in self.others:
                 return " ".join(words[start:])
         return ""
 
@@ -115,6 +124,15 @@ class Vocabulary:
     def nearest(self, text: str) -> str:
         """Return ``"; the nearest is 'x'"`` for the nearest word of the language, or nothing."""
         return nearest_name(text, self.names)
+
+
+def _joined(words: Sequence[str]) -> str:
+    """Return the words of a thing joined; empty if they cannot be of one."""
+    names = [words_of(word) for word in words]
+    # A thing does not begin or end with an article or a letter, such as S for south.
+    if not names[0] or not names[-1] or min(len(words[0]), len(words[-1])) == 1:
+        return ""
+    return "".join(itertools.chain(*names))
 
 
 @functools.cache
@@ -157,16 +175,16 @@ def _forms(phrase: str, endings: Sequence[str]) -> set[str]:
     return {"".join(words) for words in itertools.product(*forms)} - {""}
 
 
-def _by_form(terms: Terms, language: str) -> dict[str, int]:
+def _by_form(terms: Sequence[Term], language: str) -> dict[str, Codes]:
     """Return the class codes by the words of a thing in any form."""
-    classes: dict[str, int] = {}
+    classes: dict[str, Codes] = {}
     # All words as they are go before their forms, the own language before others.
     for exact in (True, False):
         for name in dict.fromkeys(["", language, *_phrases(), *(name for name, _, _ in terms)]):
             endings = () if exact else _phrases().get(name or "en", {}).get("endings", ())
-            for _, code, phrase in (item for item in terms if item[0] == name):
+            for _, codes, phrase in (item for item in terms if item[0] == name):
                 for form in _forms(phrase, endings):
-                    classes.setdefault(form, code)
+                    classes.setdefault(form, codes)
     return classes
 
 
@@ -181,6 +199,12 @@ def _vocabulary(taxonomy: Taxonomy, language: str) -> Vocabulary:
         letters=_phrases()[language]["letters"],
         names=names,
         others=frozenset(_by_form(others, language)),
+        texts={
+            form: name
+            for name in (STREET_SIGN, HOUSE_NUMBER)
+            for phrase in words_for(name)
+            for form in _forms(phrase, ())
+        },
     )
 
 
@@ -188,9 +212,10 @@ def _vocabulary(taxonomy: Taxonomy, language: str) -> Vocabulary:
 def _own_words(taxonomy: Taxonomy, language: str) -> frozenset[str]:
     """Return the single words of a language."""
     endings = ["", *_phrases()[language]["endings"]]
+    terms = (*class_words(taxonomy), *other_class_words(taxonomy))
     things = {
         word + ending
-        for name, _, phrase in class_words(taxonomy)
+        for name, _, phrase in terms
         if name == language
         for word in map(plain_word, phrase.split())
         for ending in endings

@@ -14,10 +14,12 @@ from .catalog import load_catalog as load_catalog
 from .catalog import paper_taxonomy as paper_taxonomy
 from .class_keywords import Keywords as Keywords
 from .class_keywords import Match as Match
-from .class_keywords import class_code as class_code
+from .class_keywords import Term as Term
+from .class_keywords import class_codes as class_codes
 from .class_keywords import class_words as class_words
 from .class_keywords import keywords as keywords
 from .class_keywords import other_class_words as other_class_words
+from .class_keywords import words_for as words_for
 from .class_keywords import words_of as words_of
 from .clip import BOX as BOX
 from .clip import NO_CLIP as NO_CLIP

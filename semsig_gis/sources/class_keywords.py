@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 import tomllib
 import unicodedata
@@ -27,6 +28,11 @@ ARTICLES = frozenset(
      "het", "i", "il", "in", "l", "la", "las", "le", "les", "lo", "los", "mit", "o", "of", "on",
      "per", "pour", "the", "to", "und", "van", "von"}
 )  # fmt: skip
+
+
+Codes = tuple[int, ...]
+Term = tuple[str, Codes, str]
+"""A word for a thing, with its language before and the class codes that it may be of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,22 +128,22 @@ def keywords(kind: str) -> Keywords:
     )
 
 
-def class_code(word: str, taxonomy: Taxonomy) -> int:
-    """Return the code of the class for a word of a person or a detector.
+def class_codes(word: str, taxonomy: Taxonomy) -> tuple[int, ...]:
+    """Return the codes of the classes for a word of a person or a detector, ascending.
 
     Parameters
     ----------
     word : str
-        A symbol, a name or a title of the taxonomy, another word for it, in the singular or the
-        plural, or a tag of OpenStreetMap such as ``highway=street_lamp``; ``?`` or ``unknown``
-        where the class is not known.
+        A symbol, a name or a title of the taxonomy, or a family of it, another word for these, in
+        the singular or the plural, or a tag of OpenStreetMap such as ``highway=street_lamp``; ``?``
+        or ``unknown`` where the class is not known.
     taxonomy : Taxonomy
         The classes.
 
     Returns
     -------
-    int
-        The code; `WILDCARD` where the class is not known.
+    tuple of int
+        One code, or those of all classes of a family; `WILDCARD` where the class is not known.
 
     Raises
     ------
@@ -147,35 +153,37 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
     Examples
     --------
     >>> from semsig_gis import paper_taxonomy
-    >>> [class_code(word, paper_taxonomy()) for word in ("D", "street lamps", "amenity=bench")]
-    [3, 3, 10]
+    >>> [class_codes(word, paper_taxonomy()) for word in ("D", "street lamps", "amenity=bench")]
+    [(3,), (3,), (10,)]
     """
     text = word.strip()
     if len(text) == 1:
-        return int(taxonomy.encode(text)[0])
+        return (int(taxonomy.encode(text)[0]),)
     words = _class_words(taxonomy)
-    code: int | None
+    codes: Codes | None
     if "=" in text:
         key, _, value = (part.strip() for part in text.partition("="))
-        names = _tagged_classes()
-        name = names.get(f"{key}={value}") or names.get(f"{key}=*")
-        code = next((item.code for item in taxonomy.classes if item.name == name), None)
+        tags = _tagged_classes()
+        names = tags.get(f"{key}={value}") or tags.get(f"{key}=*") or frozenset()
+        codes = _codes_of(names, taxonomy)
     else:
         joined = "".join(words_of(text))
         # The word itself, then its singular.
         forms = [joined.removesuffix(suffix) for suffix in ("", "s", "es")]
-        code = next((words[form][0] for form in forms if form in words), None)
-    if code is None:
+        codes = next((words[form][0] for form in forms if form in words), None)
+    if not codes:
         near = nearest_name(text, (name for _, name in words.values()))
         raise UnknownNameError(
             f"class {word!r} is unknown{near}; `semsig info` lists the classes of a city, and "
             "`semsig sources` those of a catalogue."
         )
-    return code
+    return codes
 
 
 SPOKEN = "said"
 """Key of words for classes in observations; layers are not recognised by them."""
+MEMBERS = "classes"
+"""Key of the classes that a word stands for, in addition to those of the family of its name."""
 
 
 @functools.cache
@@ -183,59 +191,90 @@ def _content() -> dict[str, Any]:
     return tomllib.loads((data_folder() / "keywords.toml").read_text(encoding="utf-8"))
 
 
-def class_words(
-    taxonomy: Taxonomy, *, languages: Container[str] | None = None
-) -> tuple[tuple[str, int, str], ...]:
-    """Return the words for the classes, each with its language and class code.
+def class_words(taxonomy: Taxonomy, *, languages: Container[str] | None = None) -> tuple[Term, ...]:
+    """Return the words for the classes and families, each with its language and class codes.
 
     The language of names and titles is empty, because they may be in any. Words that only people
     say may be limited to the languages `languages`.
     """
-    words = [("", WILDCARD, "unknown"), ("en", WILDCARD, "something")]
+    words: list[Term] = [("", (WILDCARD,), "unknown"), ("en", (WILDCARD,), "something")]
+    classes = _content()["classes"]
     for item in taxonomy.classes:
-        words += [("", item.code, item.title), *_keywords(item.name, item.code, languages)]
+        codes: Codes = (item.code,)
+        words.append(("", codes, item.title))
+        words += _terms(item.name, codes, classes.get(item.name, {}), languages)
+    for family, table in _content()["families"].items():
+        if codes := _family_codes(family, taxonomy):
+            words += _terms(family, codes, table, languages)
     return tuple(words)
 
 
-def other_class_words(taxonomy: Taxonomy) -> tuple[tuple[str, int, str], ...]:
-    """Return the words of `class_words` for classes that a taxonomy has not, as of `WILDCARD`."""
+def other_class_words(taxonomy: Taxonomy) -> tuple[Term, ...]:
+    """Return the words of `class_words` for what a taxonomy has not, as of `WILDCARD`."""
     own = {item.name for item in taxonomy.classes}
-    names = [name for name in _content()["classes"] if name not in own]
-    return tuple(item for name in names for item in _keywords(name, WILDCARD, None))
+    tables = {name: table for name, table in _content()["classes"].items() if name not in own}
+    tables |= {
+        name: table
+        for name, table in _content()["families"].items()
+        if not _family_codes(name, taxonomy)
+    }
+    terms = (_terms(name, (WILDCARD,), table, None) for name, table in tables.items())
+    return tuple(itertools.chain.from_iterable(terms))
 
 
-def _keywords(
-    name: str, code: int, languages: Container[str] | None
-) -> Iterator[tuple[str, int, str]]:
-    """Yield the name of a class and its keywords, each with its language and a class code."""
-    yield "", code, name.replace("_", " ")
-    by_key = dict(_content()["classes"].get(name, {}))
+def words_for(name: str) -> tuple[str, ...]:
+    """Return all words for a class or a family, in all languages."""
+    table = {**_content()["classes"], **_content()["families"]}.get(name, {})
+    return tuple(word for _, _, word in _terms(name, (), table, None))
+
+
+def _family_codes(family: str, taxonomy: Taxonomy) -> Codes:
+    """Return the class codes of a family, or of a word for several classes."""
+    members = frozenset(_content()["families"][family].get(MEMBERS, ()))
+    own = {item.name for item in taxonomy.classes if item.family == family}
+    return _codes_of(members | own, taxonomy)
+
+
+def _codes_of(names: Container[str], taxonomy: Taxonomy) -> Codes:
+    """Return the codes of the classes of a taxonomy that have one of some names, ascending."""
+    return tuple(sorted(item.code for item in taxonomy.classes if item.name in names))
+
+
+def _terms(
+    name: str,
+    codes: Codes,
+    table: Mapping[str, Any],
+    languages: Container[str] | None,
+) -> Iterator[Term]:
+    """Yield a name and its keywords, each with its language and class codes."""
+    yield "", codes, name.replace("_", " ")
+    by_key = dict(table)
     more = by_key.pop(SPOKEN, {}).items()
-    lists = [pair for pair in by_key.items() if pair[0] != "fields"]
+    lists = [pair for pair in by_key.items() if pair[0] not in {"fields", MEMBERS}]
     lists += [pair for pair in more if languages is None or pair[0] in languages]
     for key, phrases in lists:
-        yield from ((key, code, word) for word in phrases)
+        yield from ((key, codes, word) for word in phrases)
 
 
 @functools.lru_cache(maxsize=8)
-def _class_words(taxonomy: Taxonomy) -> Mapping[str, tuple[int, str]]:
-    """Return class code and original word by normalized word (lower case, no blanks)."""
-    code_of: dict[str, tuple[int, str]] = {}
-    classes = class_words(taxonomy, languages={"en"})
+def _class_words(taxonomy: Taxonomy) -> Mapping[str, tuple[Codes, str]]:
+    """Return class codes and original word by normalized word (lower case, no blanks)."""
+    codes_of: dict[str, tuple[Codes, str]] = {}
+    terms = class_words(taxonomy, languages={"en"})
     # Names and titles have priority, then English.
-    for _, code, word in sorted(classes, key=lambda item: (item[0] != "", item[0] != "en")):
+    for _, codes, word in sorted(terms, key=lambda item: (item[0] != "", item[0] != "en")):
         if joined := "".join(words_of(word)):
-            code_of.setdefault(joined, (code, word))
-    return code_of
+            codes_of.setdefault(joined, (codes, word))
+    return codes_of
 
 
 @functools.cache
-def _tagged_classes() -> Mapping[str, str]:
-    """Return the class name of each OpenStreetMap tag that belongs to exactly one class."""
+def _tagged_classes() -> Mapping[str, frozenset[str]]:
+    """Return the class names of each OpenStreetMap tag."""
     classes: dict[str, set[str]] = {}
     for layer in load_catalog("openstreetmap").layers:
         for tags in layer.tags if layer.role == "objects" else ():
             for key, values in tags:
                 for value in values:
                     classes.setdefault(f"{key}={value}", set()).add(layer.class_name)
-    return {tag: name for tag, (name, *others) in classes.items() if not others}
+    return {tag: frozenset(names) for tag, names in classes.items()}

@@ -6,7 +6,7 @@ import pytest
 from sentences import refused
 
 from semsig_gis.core import WILDCARD, ObjectClass, Taxonomy, UnknownNameError
-from semsig_gis.sources import class_code, load_catalog, paper_taxonomy
+from semsig_gis.sources import class_codes, load_catalog, paper_taxonomy
 
 TAXONOMY = load_catalog("openstreetmap").taxonomy
 WORDS = {
@@ -25,23 +25,23 @@ WORDS = {
 @pytest.mark.parametrize("name", WORDS)
 def test_word_for_a_class(name: str) -> None:
     for word in WORDS[name].split(", "):
-        assert class_code(word, TAXONOMY) == TAXONOMY.by_name(name).code, word
+        assert class_codes(word, TAXONOMY) == (TAXONOMY.by_name(name).code,), word
 
 
 @pytest.mark.parametrize("word", ["?", "unknown", " Unknown "])
 def test_word_for_the_unknown_class(word: str) -> None:
-    assert class_code(word, TAXONOMY) == WILDCARD
+    assert class_codes(word, TAXONOMY) == (WILDCARD,)
 
 
 def test_names_of_classes_are_words() -> None:
     for item in TAXONOMY.classes:
         for word in (item.symbol, item.name, item.title):
-            assert class_code(word, TAXONOMY) == item.code, word
+            assert class_codes(word, TAXONOMY) == (item.code,), word
 
 
 def test_names_of_the_taxonomy_have_priority() -> None:
     own = Taxonomy((ObjectClass(7, "W", "lamp", "Wall lamp"), ObjectClass(3, "D", "light", "Pole")))
-    assert [class_code(word, own) for word in ("lamp", "wall lamps", "pole")] == [7, 7, 3]
+    assert [class_codes(word, own) for word in ("lamp", "wall lamps", "pole")] == [(7,), (7,), (3,)]
 
 
 @pytest.mark.parametrize(
@@ -57,4 +57,4 @@ def test_names_of_the_taxonomy_have_priority() -> None:
 )
 def test_unknown_word_is_refused_with_the_nearest(word: str, message: str) -> None:
     with refused(UnknownNameError, message):
-        class_code(word, paper_taxonomy())
+        class_codes(word, paper_taxonomy())

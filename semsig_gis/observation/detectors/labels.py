@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from semsig_gis.core import (
     MAX_HEIGHT_M,
+    WILDCARD,
     Accepts,
     CatalogError,
     FileTable,
@@ -27,7 +28,7 @@ from semsig_gis.core import (
     pairs,
     read_table,
 )
-from semsig_gis.sources import built_in_taxonomy, class_code, data_folder
+from semsig_gis.sources import built_in_taxonomy, class_codes, data_folder
 from semsig_gis.storage import parse_toml, read_text
 
 if TYPE_CHECKING:
@@ -175,8 +176,10 @@ class LabelMap:
                 return meaning
         for taxonomy in self.taxonomies:
             with contextlib.suppress(UnknownNameError):
-                if code := class_code(label, taxonomy):
-                    return Meaning(((taxonomy.by_code(code).name, 1.0),))
+                codes = class_codes(label, taxonomy)
+                if codes != (WILDCARD,):
+                    names = [taxonomy.by_code(code).name for code in codes]
+                    return Meaning(tuple((name, 1.0 / len(names)) for name in names))
         return None
 
     @functools.cached_property

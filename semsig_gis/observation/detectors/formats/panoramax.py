@@ -15,7 +15,7 @@ from semsig_gis.observation.detectors.pictures import (
     box_of,
     size_of,
 )
-from semsig_gis.sources import built_in_taxonomy, class_code
+from semsig_gis.sources import built_in_taxonomy, class_codes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -105,5 +105,5 @@ def _label(semantics: Sequence[dict[str, Any]]) -> tuple[str | None, str | None]
 
 def _is_class(tag: str) -> bool:
     with contextlib.suppress(UnknownNameError):
-        return bool(class_code(tag, built_in_taxonomy()))
+        return bool(class_codes(tag, built_in_taxonomy()))
     return False
