@@ -61,7 +61,7 @@ NEAR_M, THIN_M = DEFAULT_RULE.radius, 100.0
 PARTS = 16  # of the views of a line, for the processes
 # The targets: times the share of before, where it is low; shares; and the gap of chances.
 LOW_SHARE, TIMES, LEAST_RIGHT, MOST_GAP = 0.4, 2.0, 0.96, 0.05
-ENOUGH = 50  # answers, of which the share that is right says something
+ENOUGH = 50  # answers; the share of fewer that is right says little
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,14 +173,14 @@ def _rows(
             if objects is None:
                 print(f"{name}, {line.name}: nothing of this is on the map")
                 continue
-            chosen = Loaded(
+            part = Loaded(
                 objects=objects,
                 report=loaded.report,
                 conflation=loaded.conflation,
                 buildings=loaded.buildings,
                 streets=loaded.streets,
             )
-            city = build(chosen, path, viewpoints="streets")
+            city = build(part, path, viewpoints="streets")
             for _, north in norths:
                 questions = _questions(city, everything, north, count)
                 parts = [questions[start::PARTS] for start in range(min(PARTS, count))]
@@ -271,13 +271,13 @@ def _answers(path: str, north: str, radius: float, questions: Sequence[_Question
 
 def _figures(answers: pd.DataFrame) -> dict[str, Any]:
     """Return the figures of a line; ``gap`` is how far off the chances are, on the average."""
-    seen = answers[answers["seen"] > 0]
+    usable = answers[answers["seen"] > 0]
     sure = answers["right"][answers["chance"] >= DEFAULT_RULE.threshold]
     near = float(answers["right"].mean())
     low, high = wilson_interval(near, len(answers))
     gap = None
-    if len(seen):
-        tenths = calibration_bins(seen)
+    if len(usable):
+        tenths = calibration_bins(usable)
         gaps = (tenths["stated"] - tenths["true"]).abs() * tenths["n"]
         gap = float(gaps.sum() / tenths["n"].sum())
     return {
@@ -291,7 +291,7 @@ def _figures(answers: pd.DataFrame) -> dict[str, Any]:
         "right": int(sure.sum()),
         "stated": short(float(answers["chance"].mean())),
         "gap": short(gap),
-        "region_m2": short(float(seen["region_m2"].median())) if len(seen) else None,
+        "region_m2": short(float(usable["region_m2"].median())) if len(usable) else None,
     }
 
 

@@ -120,6 +120,10 @@
         <translation>Annehmen, dass Ansichten wie im Aufsatz aus der Mitte einer Zelle stammen, statt von irgendwo in ihr.</translation>
     </message>
     <message>
+        <source>At places every 10 m along the streets, the objects in sight are counted, those of optional layers as well. Where few are seen, a view fits many places.</source>
+        <translation>An Stellen alle 10 m entlang der Straßen werden die sichtbaren Objekte gezählt, auch die der optionalen Layer. Wo wenige zu sehen sind, passt eine Ansicht zu vielen Orten.</translation>
+    </message>
+    <message>
         <source>Bearing of the middle of the photo.</source>
         <translation>Richtung der Mitte des Fotos.</translation>
     </message>
@@ -836,6 +840,10 @@
         <translation>Ansehen</translation>
     </message>
     <message>
+        <source>Look only at places in this box in degrees, or in polygons.</source>
+        <translation>Nur Stellen in diesem Rechteck in Grad oder in Polygonen betrachten.</translation>
+    </message>
+    <message>
         <source>Looking for Python...</source>
         <translation>Python wird gesucht ...</translation>
     </message>
@@ -1280,6 +1288,10 @@
         <translation>Die 10.000 Anfragen des Aufsatzes ausführen oder 300 in einer kleinen Stadt.</translation>
     </message>
     <message>
+        <source>Say what the data of a place can carry, before you build.</source>
+        <translation>Sagt vor dem Aufbau, was die Daten eines Ortes hergeben.</translation>
+    </message>
+    <message>
         <source>Scheduler</source>
         <translation>Scheduler</translation>
     </message>
@@ -1478,6 +1490,10 @@
     <message>
         <source>Surely from this area</source>
         <translation>Sicher aus diesem Gebiet</translation>
+    </message>
+    <message>
+        <source>Survey a place's data</source>
+        <translation>Daten eines Ortes sichten</translation>
     </message>
     <message>
         <source>Symbols clockwise from north, such as DDBL; ? where one is unknown.</source>

@@ -120,6 +120,10 @@
         <translation>Supposer que les vues sont prises du centre d’une cellule, comme dans l’article, et non de n’importe où en elle.</translation>
     </message>
     <message>
+        <source>At places every 10 m along the streets, the objects in sight are counted, those of optional layers as well. Where few are seen, a view fits many places.</source>
+        <translation>Tous les 10 m le long des rues, les objets visibles sont comptés, y compris ceux des couches facultatives. Là où peu d’objets sont visibles, une vue correspond à de nombreux lieux.</translation>
+    </message>
+    <message>
         <source>Bearing of the middle of the photo.</source>
         <translation>Azimut du milieu de la photo.</translation>
     </message>
@@ -836,6 +840,10 @@
         <translation>Regarder</translation>
     </message>
     <message>
+        <source>Look only at places in this box in degrees, or in polygons.</source>
+        <translation>Ne considérer que les lieux dans ce rectangle en degrés, ou dans des polygones.</translation>
+    </message>
+    <message>
         <source>Looking for Python...</source>
         <translation>Recherche de Python…</translation>
     </message>
@@ -1280,6 +1288,10 @@
         <translation>Exécuter les 10 000 requêtes de l’article, ou 300 dans une petite ville.</translation>
     </message>
     <message>
+        <source>Say what the data of a place can carry, before you build.</source>
+        <translation>Dit ce que permettent les données d’un lieu, avant la construction.</translation>
+    </message>
+    <message>
         <source>Scheduler</source>
         <translation>Ordonnanceur</translation>
     </message>
@@ -1478,6 +1490,10 @@
     <message>
         <source>Surely from this area</source>
         <translation>Sûrement de cette zone</translation>
+    </message>
+    <message>
+        <source>Survey a place's data</source>
+        <translation>Examiner les données d’un lieu</translation>
     </message>
     <message>
         <source>Symbols clockwise from north, such as DDBL; ? where one is unknown.</source>

@@ -29,7 +29,7 @@ ROLES: tuple[Role, ...] = ("buildings", "streets")
     "build",
     title="Build signature database",
     group="Prepare",
-    order=5,
+    order=6,
     returns=Properties,
     examples=(
         "semsig build objects.parquet --out city.parquet",

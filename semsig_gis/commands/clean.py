@@ -31,7 +31,7 @@ class Cleaned(TypedDict):
     "clean",
     title="Remove leftover files",
     group="Prepare",
-    order=9,
+    order=10,
     returns=Cleaned,
     examples=(
         "semsig clean city.parquet --dry-run",

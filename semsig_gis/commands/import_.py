@@ -25,7 +25,7 @@ class Imported(TypedDict):
     "import",
     title="Import from QGIS",
     group="Prepare",
-    order=8,
+    order=9,
     returns=Imported,
     examples=(
         "semsig import city.gpkg --out city.parquet",

@@ -25,7 +25,7 @@ class Merged(TypedDict):
     "merge",
     title="Merge signature databases",
     group="Prepare",
-    order=7,
+    order=8,
     returns=Merged,
     examples=(
         "semsig merge west.parquet east.parquet --out city.parquet",

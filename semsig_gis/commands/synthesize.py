@@ -23,7 +23,7 @@ class Synthesized(TypedDict):
     "synthesize",
     title="Make up a city",
     group="Prepare",
-    order=10,
+    order=11,
     returns=Synthesized,
     examples=(
         "semsig synthesize --out town --size 1000",

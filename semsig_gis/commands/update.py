@@ -35,7 +35,7 @@ class Updated(TypedDict):
     "update",
     title="Update signature database",
     group="Prepare",
-    order=6,
+    order=7,
     returns=Updated,
     examples=(
         "semsig update city.parquet --objects new_trees.parquet",

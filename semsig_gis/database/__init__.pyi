@@ -50,6 +50,13 @@ from .store import ground_box as ground_box
 from .store import open_store as open_store
 from .store import save_with_store as save_with_store
 from .store import store_path as store_path
+from .street_survey import SEEN as SEEN
+from .street_survey import FamilyRecord as FamilyRecord
+from .street_survey import FamilySurvey as FamilySurvey
+from .street_survey import SeenRecord as SeenRecord
+from .street_survey import Survey as Survey
+from .street_survey import SurveyRecord as SurveyRecord
+from .street_survey import survey as survey
 from .summary import database_summary as database_summary
 from .tiles import TilePlan as TilePlan
 from .tiles import TileSpec as TileSpec

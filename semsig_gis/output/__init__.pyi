@@ -164,6 +164,8 @@ from .tables.quality import quality_sentence as quality_sentence
 from .tables.quality import quality_tables as quality_tables
 from .tables.quality import update_sentence as update_sentence
 from .tables.quality import update_tables as update_tables
+from .tables.survey import survey_sentence as survey_sentence
+from .tables.survey import survey_tables as survey_tables
 from .tables.tables import WIDEST as WIDEST
 from .tables.tables import brief_notes as brief_notes
 from .tables.tables import distortion_rows as distortion_rows

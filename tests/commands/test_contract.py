@@ -31,6 +31,7 @@ LINES: dict[str, tuple[str, ...]] = {
     "fetch": ("catalog=tiny.toml", "area=3,43,4,44", "out=o.parquet"),
     "sources": ("name=tiny.toml",),
     "draft": ("file=lights.gpkg",),
+    "survey": ("files=.", "catalog=tiny.toml"),
     "synthesize": ("out=town", "size=100"),
     "demo": ("out=demo", "queries=2"),
     "build": ("objects=objects.parquet", "out=c.parquet"),

@@ -1,0 +1,95 @@
+"""`semsig survey`: what a place's data can carry, before a database is built."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from semsig_gis.commands.load import Crs, catalogs
+from semsig_gis.commands.model import Option, Reporter, Result, command
+from semsig_gis.database import SurveyRecord
+
+
+@command(
+    "survey",
+    title="Survey a place's data",
+    group="Prepare",
+    order=5,
+    returns=SurveyRecord,
+    examples=(
+        "semsig survey monaco.osm.pbf",
+        "semsig survey trees.geojson --catalog city.toml --area 7.41,43.73,7.42,43.74",
+    ),
+)
+@dataclass(frozen=True, kw_only=True)
+class SurveyPlace:
+    """Say what the data of a place can carry, before you build.
+
+    At places every 10 m along the streets, the objects in sight are counted, those of optional
+    layers as well. Where few are seen, a view fits many places.
+    """
+
+    files: Annotated[
+        list[Path], Option("Files, or a folder of files.", positional=True, reads=True)
+    ]
+    catalog: Annotated[
+        list[str] | None,
+        Option(
+            "Catalogue, by name or .toml file; not needed for OpenStreetMap and Overture. Repeat "
+            "to merge several, best first.",
+            title="Catalogues",
+            metavar="NAME|FILE",
+            reads=True,
+            suggestions=catalogs,
+        ),
+    ] = None
+    area: Annotated[
+        Path | None,
+        Option(
+            "Look only at places in this box in degrees, or in polygons.",
+            metavar="WEST,SOUTH,EAST,NORTH|FILE",
+            reads=True,
+        ),
+    ] = None
+    radius: Annotated[
+        float,
+        Option(
+            "Visibility range for classes without a range in the catalogue.",
+            title="Visibility range",
+            unit="m",
+            low=0.01,
+            high=6000,
+        ),
+    ] = 30.0
+    crs: Crs = None
+
+    def run(self, reporter: Reporter) -> Result:
+        """Return the numbers as values and as tables."""
+        from semsig_gis.database import survey
+        from semsig_gis.objects import load, read_area
+        from semsig_gis.output import survey_sentence, survey_tables
+
+        with reporter.progress("loading") as advance:
+            loaded = load(
+                self.files,
+                catalog=self.catalog or (),
+                selection="all",
+                crs=self.crs,
+                progress=advance,
+                remark=reporter.remark,
+            )
+        area = None
+        if self.area is not None:
+            xy = loaded.objects.xy
+            near = (*xy.min(axis=0).tolist(), *xy.max(axis=0).tolist())
+            area = read_area(self.area, crs=loaded.objects.crs, near=near)
+        with reporter.progress("looking around") as advance:
+            result = survey(loaded, radius=self.radius, area=area, progress=advance)
+        first, *others = survey_tables(result)
+        return Result(
+            values=result.to_dict,
+            summary=[survey_sentence(result), first],
+            tables=others,
+            notes=loaded.notes,
+        )
