@@ -85,7 +85,8 @@ def conflate(
         priority. InputError if they are conflated already.
     radii : mapping of str to float
         Distance in metres (above 0, below 100) by class, within which two objects of different
-        sources are the same. Other classes are unchanged. UnknownNameError for an unknown class.
+        sources are the same. Other classes, and points of extended things, are unchanged.
+        UnknownNameError for an unknown class.
 
     Returns
     -------
@@ -119,11 +120,12 @@ def conflate(
                 f"class {name!r} has the radius {radius!r}; give metres above 0 and below 100."
             )
     keys = _merge_keys(objects)
+    grouped = np.zeros(len(objects), bool) if objects.groups is None else objects.groups >= 0
     matches = [
         _Match(name, first, second, metres)
         for name, radius in radii.items()
         for first, second, metres in _matches(
-            keys, np.flatnonzero(objects.codes == codes[name]), radius
+            keys, np.flatnonzero((objects.codes == codes[name]) & ~grouped), radius
         )
     ]
     return _merged(objects, keys, matches), _report(keys, matches, radii)

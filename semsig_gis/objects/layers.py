@@ -17,8 +17,10 @@ from semsig_gis.core import (
     CLASS_NAME,
     COUNT,
     GEOMETRY,
+    GROUP,
     HEIGHT,
     LICENSES,
+    NAME,
     SOURCE,
     SOURCE_ID,
     TEXTS,
@@ -30,6 +32,7 @@ from semsig_gis.core import (
     require_metric_crs,
 )
 from semsig_gis.objects.conflation import ConflationReport, conflate
+from semsig_gis.objects.extended import thing_points
 from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import (
@@ -54,7 +57,7 @@ from semsig_gis.sources import (
 from semsig_gis.storage import points_to_wkb
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
     from pathlib import Path
 
     import geopandas as gpd
@@ -62,6 +65,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.core import AnyCrs, MapFrame, Taxonomy
+    from semsig_gis.objects.extended import ThingPoints
     from semsig_gis.objects.table import StreetObjects
     from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer, Role, RowCounts
 
@@ -127,7 +131,8 @@ def build_objects(
     """Return one table of street objects from raw layers.
 
     A geometry that is not a point is represented by its centroid in the metric CRS (paper, section
-    on semantic signatures). Rows without a valid position are dropped and counted.
+    on semantic signatures), and an extended thing by points along its line or outline, with a
+    number in ``group``. Rows without a valid position are dropped and counted.
 
     Parameters
     ----------
@@ -186,6 +191,8 @@ def build_objects(
     is_duplicate[np.unique(keys, return_index=True)[1]] = False
     duplicates = np.bincount(owner[is_duplicate], minlength=len(parts)).tolist()
     rows = np.flatnonzero(~is_duplicate)
+    is_thing = np.isin(codes, [item.code for item in taxonomy.classes if item.shape != "point"])
+    things, rows = rows[is_thing[rows]], rows[~is_thing[rows]]
     # Collapse objects of a class at the same place, by layer for the classes in `apart`.
     counts = np.ones(len(rows), np.int64)
     if collapse:
@@ -194,7 +201,13 @@ def build_objects(
         xy[rows] = _at_points(xy[rows], shapes[rows], group[rows])
         first, counts = _first_at_place(xy[rows], group[rows])
         rows = rows[first]
-    remaining = np.bincount(owner[rows], minlength=len(parts)).tolist()
+    remaining = np.bincount(owner[[*rows, *things]], minlength=len(parts)).tolist()
+    facts = _facts(parts)
+    points = _thing_points(shapes[things], codes[things], facts, things, taxonomy)
+    groups = np.concatenate([np.full(len(rows), -1), points.groups]).astype(np.int32)
+    places = np.concatenate([xy[rows], points.xy])
+    rows = np.concatenate([rows, things[points.rows]])
+    counts = np.concatenate([counts, np.ones(len(points.rows), np.int64)])
     reports = []
     for layer, part, duplicate_count, remaining_count in zip(
         layers, parts, duplicates, remaining, strict=True
@@ -214,12 +227,13 @@ def build_objects(
         SOURCE: pa.array(names.tolist(), pa.string()).take(pa.array(source[owner[rows]])),
         SOURCE_ID: ids.take(pa.array(rows)),
         COUNT: counts.astype(np.int32),
-        **_facts(parts, rows),
-        GEOMETRY: points_to_wkb(xy[rows]),
+        GROUP: groups,
+        **{name: values.take(pa.array(rows)) for name, values in facts.items()},
+        GEOMETRY: points_to_wkb(places),
     }
     objects = arrow_objects(
         without_empty(pa.table(columns)),
-        xy=xy[rows],
+        xy=places,
         crs=system,
         taxonomy=taxonomy,
         licenses=layer_licences(layers),
@@ -228,8 +242,21 @@ def build_objects(
     return objects, report
 
 
-def _facts(parts: Sequence[_Placed], rows: NDArray[np.int64]) -> dict[str, pa.Array]:
-    """Return the heights and texts of rows of all layers; layers without a column have no value."""
+def _thing_points(
+    shapes: NDArray[np.object_],
+    codes: NDArray[np.uint8],
+    facts: Mapping[str, pa.ChunkedArray],
+    rows: NDArray[np.int64],
+    taxonomy: Taxonomy,
+) -> ThingPoints:
+    """Return the points of the extended things in some rows."""
+    names = facts[NAME].take(pa.array(rows)).to_pylist() if NAME in facts else [""] * len(rows)
+    lines = [item.code for item in taxonomy.classes if item.shape == "line"]
+    return thing_points(shapes, codes, names, joins=np.isin(codes, lines))
+
+
+def _facts(parts: Sequence[_Placed]) -> dict[str, pa.ChunkedArray]:
+    """Return the heights and texts of all layers; rows of layers without a column have no value."""
     columns = {}
     for name in (HEIGHT, *TEXTS):
         if any(name in part.facts.column_names for part in parts):
@@ -247,7 +274,7 @@ def _facts(parts: Sequence[_Placed], rows: NDArray[np.int64]) -> dict[str, pa.Ar
                 ],
                 kind,
             )
-            columns[name] = pc.fill_null(values.take(pa.array(rows)), empty)
+            columns[name] = pc.fill_null(values, empty)
     return columns
 
 

@@ -32,6 +32,8 @@ T = TypeVar("T", shapely.Polygon | shapely.MultiPolygon, "NDArray[np.object_]")
 # The text by which a user requests the bounding box that a file states.
 BOX = "box"
 NO_CLIP = "none"
+# Distance between points along the edges of an area, which are curves in another CRS.
+EDGE_DEGREES = 0.01
 METRES_A_DEGREE = 111_195.0  # of latitude
 POLYGONAL = {"Polygon", "MultiPolygon"}
 
@@ -160,11 +162,33 @@ def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
     """Remove the rows of a layer that are outside an area.
 
     An object is kept if its centroid is in the area, a building or street if it touches the area,
-    and a row without a position always.
+    and a row without a position always. Of lines and outlines of extended things, the parts in the
+    area are kept.
     """
+    layer = _cut(layer, area) if layer.spec.extended else layer
     outside, _ = _outside(layer, area)
     counts = dataclasses.replace(layer.counts, outside=layer.counts.outside + int(outside.sum()))
-    return layer.select(~outside, counts=counts)
+    return layer.select(~outside, counts=counts, extent=area)
+
+
+def _cut(layer: RawLayer, area: Area) -> RawLayer:
+    """Return a layer of extended things that are cut where an area ends."""
+    edge = shapely.segmentize(area.polygon, EDGE_DEGREES)
+    (polygon,) = transformed(np.array([edge], object), WGS84, layer.known_crs)
+    shapely.prepare(polygon)
+    geometry = layer.geometry.copy()
+    dimensions = shapely.get_dimensions(geometry)
+    across = (
+        (dimensions > 0)
+        & shapely.intersects(polygon, geometry)
+        & ~shapely.covers(polygon, geometry)
+    )
+    areas = across & (dimensions == 2)  # noqa: PLR2004
+    geometry[areas] = shapely.boundary(geometry[areas])
+    inside = shapely.intersection(geometry[across], polygon)
+    # What only surrounds the area, or touches it, stays as it was and is outside.
+    geometry[across] = np.where(shapely.is_empty(inside), geometry[across], inside)
+    return dataclasses.replace(layer, geometry=geometry)
 
 
 def note_outside(layer: RawLayer) -> RawLayer:
@@ -189,7 +213,7 @@ def _outside(layer: RawLayer, area: Area) -> tuple[NDArray[np.bool_], NDArray[np
     outside = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
     outside &= ~shapely.covers(area.polygon, geometry)
     places = _narrowed(geometry[outside], area)
-    if layer.spec.role == "objects":
+    if layer.spec.role == "objects" and not layer.spec.extended:
         places = shapely.centroid(places)
     narrowed = _narrowed(area.polygon, area)
     shapely.prepare(narrowed)

@@ -315,10 +315,10 @@ class LayerSpec:
 
     def _check_derived(self, taxonomy: Taxonomy) -> None:
         """Raise CatalogError for keys that a layer without files cannot have."""
-        given = {"class": self.class_name, "class_by": self.class_by, "files": self.files,
+        keys = {"class": self.class_name, "class_by": self.class_by, "files": self.files,
                  "tags": self.tags, "where": self.where, "not": self.exclusions,
                  "dataset": self.dataset}  # fmt: skip
-        useless = next((key for key, value in given.items() if value), None)
+        useless = next((key for key, value in keys.items() if value), None)
         if useless is not None or self.role != "objects":
             raise CatalogError(
                 f"derive computes objects from streets and buildings, without "

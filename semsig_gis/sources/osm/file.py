@@ -73,6 +73,12 @@ class _Outline(NamedTuple):
         # The file may lack ways or nodes at its edge.
         ways = (*self.outer, *self.inner)
         absent = sum(way not in lines for way in ways)
+        incomplete = absent or any(np.isnan(lines[way]).any() for way in ways)
+        if incomplete and self.layer.spec.extended:
+            # The outline of an extended thing needs not be complete.
+            parts = [part for way in ways if way in lines for part in _known_parts(lines[way])]
+            if parts:
+                return shapely.MultiLineString(parts)
         if absent:
             what = f"{absent} of its {len(ways)} ways"
             return f"{self.name} lacks {what}, as where a file is clipped"
@@ -88,6 +94,13 @@ class _Outline(NamedTuple):
             return relation_shape(outer, inner)
         except BadFeatureError as error:
             return f"{self.name} {error}"
+
+
+def _known_parts(line: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the parts of a line, shape (n, 2), with known nodes."""
+    known = ~np.isnan(line[:, 0])
+    starts = np.flatnonzero(np.diff(known, prepend=False))
+    return [part for part in np.split(line, starts) if len(part) > 1 and not np.isnan(part).any()]
 
 
 def read_layers(
