@@ -101,6 +101,11 @@ class ObjectClass:
         check_height(self.height_m, self.height_sigma, f"class {self.name!r}")
 
 
+def _usual_family(code: int) -> str:
+    """Return the family of a class that states none in a file."""
+    return "furniture" if code < OWN_CODES else ""
+
+
 def check_height(height: float | None, sigma: float | None, what: str) -> None:
     """Raise CatalogError if a height and its deviation (metres) are incomplete or out of range.
 
@@ -161,13 +166,25 @@ class Taxonomy(Displayed):
     @classmethod
     def from_list(cls, items: Iterable[Mapping[str, Any]]) -> Taxonomy:
         """Return a taxonomy from plain mappings, the inverse of `to_list`."""
-        return cls(tuple(ObjectClass(**item) for item in items))
+        return cls(
+            tuple(
+                ObjectClass(**{"family": _usual_family(item.get("code", MAX_CODE)), **item})
+                for item in items
+            )
+        )
 
     def to_list(self) -> list[dict[str, Any]]:
-        """Return the classes as plain mappings for JSON, without fields that have their default."""
+        """Return the classes as plain mappings for JSON, without fields that have their default.
+
+        The family of a built-in class is furniture by default.
+        """
         defaults = {item.name: item.default for item in fields(ObjectClass)}
         return [
-            {key: value for key, value in asdict(item).items() if value != defaults[key]}
+            {
+                key: value
+                for key, value in asdict(item).items()
+                if value != defaults[key] and (key, value) != ("family", _usual_family(item.code))
+            }
             for item in self.classes
         ]
 

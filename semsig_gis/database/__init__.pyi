@@ -10,6 +10,7 @@ from .city import whole_database as whole_database
 from .companion_files import Companion as Companion
 from .companion_files import companions as companions
 from .companion_files import remove_companions as remove_companions
+from .database import EXTENT_UNITS as EXTENT_UNITS
 from .database import CellGeometry as CellGeometry
 from .database import CellTable as CellTable
 from .database import SignatureDatabase as SignatureDatabase
@@ -17,6 +18,7 @@ from .database import join_databases as join_databases
 from .database import require_same_place as require_same_place
 from .database import rows_of_result as rows_of_result
 from .database import visible_objects_in as visible_objects_in
+from .file import EXTENTS as EXTENTS
 from .file import INPUTS as INPUTS
 from .file import MANIFEST as MANIFEST
 from .file import Manifest as Manifest

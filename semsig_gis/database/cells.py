@@ -11,6 +11,7 @@ import numpy as np
 
 from semsig_gis.core import (
     BEARING_UNITS,
+    FULL_TURN,
     DistanceScale,
     EmptyResultError,
     GridSpec,
@@ -25,7 +26,7 @@ from semsig_gis.core import (
     split_ids,
 )
 from semsig_gis.database.city import City
-from semsig_gis.database.database import SignatureDatabase
+from semsig_gis.database.database import EXTENT_UNITS, SignatureDatabase
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.sightings import clockwise_order, measure_sightings
 from semsig_gis.database.store import ObjectStore, save_with_store
@@ -258,8 +259,10 @@ def build_cells(
     if not partial:
         announce(expected * (PAIR_S if buildings is None else HIDDEN_PAIR_S), "building")
     columns, rows = columns[mask], rows[mask]
-    # Lengths, codes, bearings and distances of each block; the first, empty block has the types.
-    blocks = [tuple(np.empty(0, kind) for kind in (np.int64, np.uint8, np.uint16, np.uint8))]
+    # Lengths, codes, bearings, distances and extents of each block; the first, empty block has the
+    # types.
+    kinds = (np.int64, np.uint8, np.uint16, np.uint8, np.uint8)
+    blocks = [tuple(np.empty(0, kind) for kind in kinds)]
     for cells, pairs in sightings_by_block(
         columns,
         rows,
@@ -268,20 +271,23 @@ def build_cells(
         index=PackedIndex(objects.xy),
         ranges=ranges[codes],
         footprints=buildings,
+        groups=objects.groups,
     ):
         order = clockwise_order(pairs, codes)
         units = np.floor(pairs.bearing * (BEARING_UNITS / 360.0))
+        extent = np.empty(0) if pairs.extent is None else pairs.extent[order]
         blocks.append(
             (
                 np.bincount(pairs.viewpoint, minlength=cells.stop - cells.start),
                 codes[pairs.object][order],
                 np.minimum(units, BEARING_UNITS - 1).astype(np.uint16)[order],
                 scale.units(pairs.distance)[order],
+                np.rint(extent * (EXTENT_UNITS / FULL_TURN)).astype(np.uint8),
             )
         )
         if progress is not None:
             progress(cells.stop, len(columns))
-    lengths, seen_codes, bearing_units, distance_units = (
+    lengths, seen_codes, bearing_units, distance_units, extent_units = (
         np.concatenate(parts) for parts in zip(*blocks, strict=True)
     )
     nonempty = lengths > 0
@@ -292,6 +298,7 @@ def build_cells(
         codes=seen_codes,
         bearing_units=bearing_units,
         distance_units=distance_units,
+        extent_units=extent_units if extent_units.any() else None,
         grid=grid,
         spec=spec,
         taxonomy=objects.taxonomy,
@@ -344,13 +351,14 @@ def sightings_by_block(
     index: PackedIndex,
     ranges: NDArray[np.float64],
     footprints: Footprints | None = None,
+    groups: NDArray[np.int32] | None = None,
 ) -> Iterator[tuple[slice, SightingPairs]]:
     """Yield the sightings from the centres of grid cells, block by block.
 
     The cells are distinct and ordered by column and row. `index` is an R-tree over `objects`,
-    positions in metres; `ranges` is the visibility range of each object in metres. Each block is a
-    slice of the cells and their sightings in any order, with viewpoints counted from the first cell
-    of the slice.
+    positions in metres; `ranges` and `groups` are as in `measure_sightings`. Each block is a slice
+    of the cells and their sightings in any order, with viewpoints counted from the first cell of
+    the slice.
     """
     starts = range(0, len(columns), CELLS_PER_BLOCK)
     blocks = [
@@ -369,7 +377,9 @@ def sightings_by_block(
         centres = grid.viewpoints(*cells)
         yield (
             block,
-            measure_sightings(*pairs, centres, objects, ranges=ranges, footprints=footprints),
+            measure_sightings(
+                *pairs, centres, objects, ranges=ranges, footprints=footprints, groups=groups
+            ),
         )
 
 

@@ -21,6 +21,7 @@ from pyproj import CRS
 from semsig_gis import __version__
 from semsig_gis.core import (
     BEARING_UNITS,
+    FULL_TURN,
     LICENSES,
     DatabaseError,
     Displayed,
@@ -70,7 +71,8 @@ SETTINGS = {
     "reach": "longest visibility range",
 }
 CELL_ARRAYS = ("columns", "rows")
-ENTRY_ARRAYS = ("codes", "bearing_units", "distance_units")
+ENTRY_ARRAYS = ("codes", "bearing_units", "distance_units", "extent_units")
+EXTENT_UNITS = 255  # of a full turn
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,6 +113,9 @@ class SignatureDatabase(Displayed):
         if it was built without buildings.
     notes : tuple of str
         Warnings about the data that it was built from.
+    extent_units : ndarray of uint8, shape (m,), or None
+        Angular width of the visible part of each extended thing, 0 for points, in 1/255 of a turn;
+        None if nothing is extended.
 
     Examples
     --------
@@ -133,10 +138,17 @@ class SignatureDatabase(Displayed):
     viewpoints: ViewpointSpec = ViewpointSpec()  # noqa: RUF009 - it is immutable
     occlusion: float | None = None
     notes: tuple[str, ...] = ()
+    extent_units: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
-        for name in ("offsets", *CELL_ARRAYS, *ENTRY_ARRAYS):
-            getattr(self, name).setflags(write=False)
+        for array in (self.offsets, self.columns, self.rows, *self.entry_arrays.values()):
+            array.setflags(write=False)
+
+    @property
+    def entry_arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays of one value an entry, by the name of the attribute."""
+        arrays = {name: getattr(self, name) for name in ENTRY_ARRAYS}
+        return {name: values for name, values in arrays.items() if values is not None}
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.columns)
@@ -196,6 +208,16 @@ class SignatureDatabase(Displayed):
     def distances(self) -> NDArray[np.float64]:
         """Distance of every entry in metres, rounded to a unit of `scale`, shape (m,)."""
         return self.scale.metres[self.distance_units]
+
+    @property
+    def extents(self) -> NDArray[np.float64] | None:
+        """Angular width of every entry in degrees, shape (m,); None if nothing is extended."""
+        return None if self.extent_units is None else self.extent_units * (FULL_TURN / EXTENT_UNITS)
+
+    @cached_property
+    def is_extended(self) -> bool:
+        """Whether a cell sees something that is wider than a point."""
+        return self.extent_units is not None and bool(self.extent_units.any())
 
     @cached_property
     def levels(self) -> NDArray[np.uint8]:
@@ -268,7 +290,7 @@ class SignatureDatabase(Displayed):
             self,
             offsets=np.append(0, np.cumsum(lengths)),
             **{name: getattr(self, name)[rows] for name in CELL_ARRAYS},
-            **{name: getattr(self, name)[entries] for name in ENTRY_ARRAYS},
+            **{name: values[entries] for name, values in self.entry_arrays.items()},
         )
 
     def types(self, cell: int) -> str:
@@ -281,7 +303,8 @@ class SignatureDatabase(Displayed):
         The columns are as in `export_database`: ``cell_id``, ``x`` and ``y``
         (viewpoint), ``length`` (objects), ``types`` (symbols), ``bearings``, ``levels`` and
         ``distances`` (text, one number per object), and ``type_group_size`` and
-        ``angle_group_size`` (number of cells with the same sequence).
+        ``angle_group_size`` (number of cells with the same sequence). If something is extended,
+        ``extents`` has the widths in degrees.
         """
         return CellTable(self, geometry=geometry).frame()
 
@@ -318,8 +341,10 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
         )
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("lengths", *CELL_ARRAYS, *ENTRY_ARRAYS)
+        for name in ("lengths", *CELL_ARRAYS)
     }
+    for name in dict.fromkeys(name for part in parts for name in part.entry_arrays):
+        arrays[name] = np.concatenate([entry_values(part, name) for part in parts])
     joined = replace(
         first,
         offsets=np.append(0, np.cumsum(arrays.pop("lengths"))),
@@ -328,6 +353,12 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
         **arrays,
     )
     return joined if (np.diff(order) == 1).all() else joined.select(order)
+
+
+def entry_values(database: SignatureDatabase, name: str) -> NDArray[Any]:
+    """Return an array of `ENTRY_ARRAYS`; zeros for extents if nothing is extended."""
+    values: NDArray[Any] | None = getattr(database, name)
+    return np.zeros(len(database.codes), np.uint8) if values is None else values
 
 
 def require_same(
@@ -399,6 +430,7 @@ def visible_objects_in(database: SignatureDatabase, cells: NDArray[np.int64]) ->
         codes=part.codes,
         bearings=part.bearings + 180.0 / BEARING_UNITS,
         distances=part.distances,
+        extents=part.extents,
     )
 
 
@@ -411,13 +443,15 @@ class CellTable:
             hint = nearest_name(str(geometry), get_args(CellGeometry))
             raise UnknownNameError(f"{geometry!r} is not a way to draw a cell; give {names}{hint}.")
         self._database, self._geometry = database, geometry
-        self._symbols = pa.array([chr(symbol) for symbol in database.taxonomy.symbol_bytes])
+        self._symbols = pa.array([chr(symbol) for symbol in database.taxonomy.symbol_points])
         degrees = (unit * 360 / BEARING_UNITS for unit in range(BEARING_UNITS))
         self._degrees = pa.array([f"{bearing:.2f}" for bearing in degrees])
         self._levels = pa.array([str(level) for level in range(1 << 8)])
         distances = database.scale.metres
         decimals = max(2, math.ceil(-math.log10(distances[1])))  # so that they differ
         self._metres = pa.array([f"{distance:.{decimals}f}" for distance in distances.tolist()])
+        extents = np.arange(EXTENT_UNITS + 1) * (FULL_TURN / EXTENT_UNITS)
+        self._extents = pa.array([f"{extent:.1f}" for extent in extents.tolist()])
         self._groups = {
             "type_group_size": database.type_group_sizes,
             "angle_group_size": database.angle_group_sizes,
@@ -428,6 +462,10 @@ class CellTable:
         database = self._database
         places = database.xy[rows]
         offsets = database.offsets[rows.start : rows.stop + 1]
+        extents = {}
+        if database.is_extended:
+            widths = entry_values(database, "extent_units")
+            extents = {"extents": _joined(widths, offsets, texts=self._extents)}
         return {
             "cell_id": database.cell_ids[rows],
             "x": np.ascontiguousarray(places[:, 0]),
@@ -437,6 +475,7 @@ class CellTable:
             "bearings": _joined(database.bearing_units, offsets, texts=self._degrees),
             "levels": _joined(database.levels, offsets, texts=self._levels),
             "distances": _joined(database.distance_units, offsets, texts=self._metres),
+            **extents,
             **{name: sizes[rows] for name, sizes in self._groups.items()},
         }
 

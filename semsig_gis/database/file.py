@@ -45,7 +45,12 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
 KIND = "signature database"
-FORMAT = 2  # increased when older files would be read incorrectly
+FORMAT = 3  # increased when older files would be read incorrectly
+PLAIN_FORMAT = 2  # of files that the version before can read as well
+NEW_FIELDS = {"family", "shape", "tall"}  # of classes, since format 3
+ASCII = 128
+TWO_BYTES = 1 << 11  # first code point that has more than two bytes in UTF-8
+EXTENTS = "extents"
 # Readers of Parquet folders, such as pyarrow, ignore names with a leading underscore.
 MANIFEST = "_manifest.json"
 INPUTS = "_inputs"  # copies of the objects, buildings and streets of a database in parts
@@ -66,9 +71,10 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
     Notes
     -----
     Columns: ``cell_id`` (int64), ``types`` (symbols), ``bearings`` (list of uint16, in 1/20
-    degree), ``distances`` (list of uint8, in 1/255 of the largest visibility range), ``length``
-    (int32) and ``geometry`` (the viewpoint as WKB). The metadata key ``semsig`` holds
-    the specs, the classes and the licences as JSON.
+    degree), ``distances`` (list of uint8, in units of `SignatureDatabase.scale`), ``length``
+    (int32) and ``geometry`` (the viewpoint as WKB), and ``extents`` (list of uint8, in 1/255 turn)
+    if something is extended. The metadata key ``semsig`` holds the specs, the classes and the
+    licences as JSON.
 
     Examples
     --------
@@ -78,18 +84,18 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
     ...     open_database(f"{folder}/city.parquet").types(0) == demo_database.types(0)
     True
     """
-    symbols = pa.py_buffer(database.taxonomy.symbol_bytes[database.codes])
     offsets = pa.array(database.offsets).cast(pa.int32())
-    table = pa.table(
-        {
-            "cell_id": pa.array(database.cell_ids),
-            "types": pa.StringArray.from_buffers(len(database), offsets.buffers()[1], symbols),
-            "bearings": pa.ListArray.from_arrays(offsets, pa.array(database.bearing_units)),
-            "distances": pa.ListArray.from_arrays(offsets, pa.array(database.distance_units)),
-            "length": pa.array(database.lengths.astype(np.int32)),
-            "geometry": points_to_wkb(database.xy),
-        }
-    )
+    columns = {
+        "cell_id": pa.array(database.cell_ids),
+        "types": type_texts(database),
+        "bearings": pa.ListArray.from_arrays(offsets, pa.array(database.bearing_units)),
+        "distances": pa.ListArray.from_arrays(offsets, pa.array(database.distance_units)),
+        "length": pa.array(database.lengths.astype(np.int32)),
+        "geometry": points_to_wkb(database.xy),
+    }
+    if database.is_extended:
+        columns[EXTENTS] = pa.ListArray.from_arrays(offsets, pa.array(database.extent_units))
+    table = pa.table(columns)
     write_geoparquet(
         table,
         path,
@@ -98,12 +104,38 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
     )
 
 
+def type_texts(database: SignatureDatabase) -> pa.StringArray:
+    """Return the type sequence of every cell as text."""
+    points = database.taxonomy.symbol_points
+    offsets = database.offsets
+    if points.max() < ASCII:
+        symbols = points.astype(np.uint8)[database.codes]
+    else:  # a symbol beyond ASCII has two bytes
+        texts = [chr(point).encode() for point in points.tolist()]
+        sizes = np.array([len(text) for text in texts])[database.codes]
+        offsets = np.append(0, np.cumsum(sizes))[offsets]
+        table = np.frombuffer(b"".join(text.ljust(2, b"\0") for text in texts), np.uint8)
+        both = table.reshape(-1, 2)[database.codes]
+        symbols = both[np.arange(2) < sizes[:, None]]
+    ends = pa.array(offsets).cast(pa.int32()).buffers()[1]
+    return pa.StringArray.from_buffers(len(database), ends, pa.py_buffer(symbols))
+
+
+def _is_plain(database: SignatureDatabase) -> bool:
+    """Whether the version before can read a database: without landmarks, families and extents."""
+    return not database.is_extended and all(
+        item["symbol"].isascii() and NEW_FIELDS.isdisjoint(item)
+        for item in database.taxonomy.to_list()
+    )
+
+
 def database_specs(database: SignatureDatabase) -> dict[str, Any]:
     """Return the specs of a database as plain values for JSON; notes only if there are any."""
-    notes = {NOTES: list(database.notes)} if database.notes else {}
+    notes: dict[str, Any] = {NOTES: list(database.notes)} if database.notes else {}
+    extents = {EXTENTS: True} if database.is_extended else {}
     return {
         "kind": KIND,
-        "format": FORMAT,
+        "format": PLAIN_FORMAT if _is_plain(database) else FORMAT,
         "version": database.version,
         "grid": asdict(database.grid),
         "signature": asdict(database.spec),
@@ -111,6 +143,7 @@ def database_specs(database: SignatureDatabase) -> dict[str, Any]:
         "occlusion": database.occlusion,
         "taxonomy": database.taxonomy.to_list(),
         "licenses": list(database.licenses),
+        **extents,
         **notes,
     }
 
@@ -144,7 +177,8 @@ def open_database(path: str | Path) -> SignatureDatabase:
     if is_folder(path):
         return join_databases([open_database(part) for part in part_files(path)])
     columns = ["cell_id", "types", "bearings", "distances"]
-    return database_of(*read_geoparquet(path, kind=KIND, columns=columns), path=path)
+    table, specs, crs = read_geoparquet(path, kind=KIND, columns=columns, optional=[EXTENTS])
+    return database_of(table, specs, crs, path=path)
 
 
 def database_of(
@@ -154,19 +188,22 @@ def database_of(
 
     Raise DatabaseError, with `path`, if they are damaged or from another version.
     """
-    if specs.get("format") != FORMAT:
+    if specs.get("format") not in {PLAIN_FORMAT, FORMAT}:
         raise DatabaseError(
             f"{path} was written by another version of semsig ({specs.get('version')}); "
             "build the database again."
         )
     try:
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
-        codes_of = np.zeros(256, np.uint8)
+        codes_of = np.zeros(TWO_BYTES, np.uint8)
         for item in taxonomy.classes:
             codes_of[ord(item.symbol)] = item.code
         symbols, offsets = _text(table["types"])
         bearing_units, bearing_offsets = _numbers(table["bearings"], pa.uint16())
         distance_units, distance_offsets = _numbers(table["distances"], pa.uint8())
+        extent_units, extent_offsets = None, offsets
+        if specs.get(EXTENTS):
+            extent_units, extent_offsets = _numbers(table[EXTENTS], pa.uint8())
         cells = whole_numbers(table["cell_id"]).astype(np.int64, casting="safe")
         columns, rows = split_ids(cells)
         database = SignatureDatabase(
@@ -185,6 +222,7 @@ def database_of(
             viewpoints=ViewpointSpec.from_dict(specs["viewpoints"]),
             occlusion=None if specs["occlusion"] is None else float(specs["occlusion"]),
             notes=tuple(map(str, specs.get(NOTES, ()))),
+            extent_units=extent_units,
         )
     except (KeyError, TypeError, ValueError, SemsigError) as error:
         raise DatabaseError(f"{path} is damaged ({error}); build the database again.") from error
@@ -194,6 +232,7 @@ def database_of(
     consistent = (
         np.array_equal(offsets, bearing_offsets)
         and np.array_equal(offsets, distance_offsets)
+        and np.array_equal(offsets, extent_offsets)
         and (np.diff(offsets) > 0).all()
         and (np.diff(cells) > 0).all()
         and database.codes.all()
@@ -207,13 +246,23 @@ def database_of(
     return database
 
 
-def _text(column: pa.ChunkedArray) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-    """Return the flat bytes and offsets of an Arrow column of strings."""
+def _text(column: pa.ChunkedArray) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    """Return the flat code points and offsets of an Arrow column of strings.
+
+    ValueError for letters of more than two bytes, which are no symbols.
+    """
     array = _as_array(column, pa.string())
     _, ends, flat = array.buffers()
     offsets = np.frombuffer(ends, np.int32)[array.offset : array.offset + len(array) + 1]
-    symbols = np.frombuffer(flat, np.uint8)[offsets[0] : offsets[-1]]
-    return symbols, offsets.astype(np.int64) - offsets[0]
+    text = np.frombuffer(flat, np.uint8)[offsets[0] : offsets[-1]]
+    offsets = offsets.astype(np.int64) - offsets[0]
+    if text.max(initial=0) < ASCII:
+        return text, offsets
+    points = np.frombuffer(text.tobytes().decode().encode("utf-32-le"), "<u4")
+    if points.max() >= TWO_BYTES:
+        raise ValueError(f"symbol {chr(points.max())!r} is no letter of a class")
+    first = (text & 0xC0) != 0x80  # noqa: PLR2004 - all other bytes begin a letter
+    return points, np.append(0, np.cumsum(first))[offsets]
 
 
 def _numbers(column: pa.ChunkedArray, kind: pa.DataType) -> tuple[NDArray[Any], NDArray[np.int64]]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core import FULL_TURN
+from semsig_gis.core import FULL_TURN, signed_degrees
 from semsig_gis.database.occlusion import hidden
 
 if TYPE_CHECKING:
@@ -27,18 +28,24 @@ class SightingPairs:
     """Pairs of a viewpoint and a visible object, both as row numbers.
 
     `bearing` is in degrees clockwise from grid north, [0, 360), to nine decimals, `distance` in
-    metres.
+    metres. `extent` is the angular width of the visible points of an extended thing in degrees, 0
+    for points; None if there are no extended things.
     """
 
     viewpoint: NDArray[np.int64]
     object: NDArray[np.int64]
     bearing: NDArray[np.float64]
     distance: NDArray[np.float64]
+    extent: NDArray[np.float64] | None = None
 
     def take(self, pairs: NDArray[np.bool_] | NDArray[np.int64]) -> SightingPairs:
         """Return some of the pairs, by mask or by number in any order."""
         return SightingPairs(
-            self.viewpoint[pairs], self.object[pairs], self.bearing[pairs], self.distance[pairs]
+            self.viewpoint[pairs],
+            self.object[pairs],
+            self.bearing[pairs],
+            self.distance[pairs],
+            None if self.extent is None else self.extent[pairs],
         )
 
 
@@ -61,11 +68,13 @@ def measure_sightings(
     *,
     ranges: NDArray[np.float64],
     footprints: Footprints | None = None,
+    groups: NDArray[np.int32] | None = None,
 ) -> SightingPairs:
     """Return the pairs that are within range and not hidden by a building, with measures.
 
     A pair is a row of `viewpoints` and a row of `objects`, positions in metres; `ranges` is the
-    visibility range of each object in metres.
+    visibility range of each object in metres. `groups` is the extended thing that each object is a
+    point of, -1 for none: of these, only the nearest visible point is returned.
     """
     dx = objects[:, 0][item] - viewpoints[:, 0][viewpoint]
     dy = objects[:, 1][item] - viewpoints[:, 1][viewpoint]
@@ -75,13 +84,45 @@ def measure_sightings(
     bearing = np.round(bearings(dx[near], dy[near]), BEARING_DECIMALS)
     bearing[bearing >= FULL_TURN] = 0.0
     pairs = SightingPairs(viewpoint[near], item[near], bearing, distance[near])
-    if footprints is None:
-        return pairs
-    # `hidden` is fastest if the pairs of a viewpoint follow each other.
-    pairs = pairs.take(np.argsort(pairs.viewpoint, kind="stable"))
-    return pairs.take(
-        ~hidden(viewpoints[pairs.viewpoint], objects[pairs.object], footprints=footprints)
-    )
+    if footprints is not None:
+        # `hidden` is fastest if the pairs of a viewpoint follow each other.
+        pairs = pairs.take(np.argsort(pairs.viewpoint, kind="stable"))
+        pairs = pairs.take(
+            ~hidden(viewpoints[pairs.viewpoint], objects[pairs.object], footprints=footprints)
+        )
+    return pairs if groups is None else _nearest_points(pairs, groups)
+
+
+def _nearest_points(pairs: SightingPairs, groups: NDArray[np.int32]) -> SightingPairs:
+    """Return the pairs with only the nearest point of each group, and the extent of the group.
+
+    Of points at one distance, the first clockwise from north is taken.
+    """
+    group = groups[pairs.object]
+    grouped = np.flatnonzero(group >= 0)
+    extent = np.zeros(len(group))
+    if not len(grouped):
+        return replace(pairs, extent=extent)
+    keys = pairs.viewpoint[grouped] * (int(group.max()) + 1) + group[grouped]
+    # The points of one viewpoint and group follow each other in `grouped`.
+    order = np.argsort(keys, kind="stable")
+    keys, grouped = keys[order], grouped[order]
+    starts = np.flatnonzero(np.append(True, keys[1:] != keys[:-1]))
+    sizes = np.diff(np.append(starts, len(keys)))
+
+    def least(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return np.asarray(values == np.repeat(np.minimum.reduceat(values, starts), sizes))
+
+    distance, bearing = pairs.distance[grouped], pairs.bearing[grouped]
+    nearest = np.flatnonzero(least(np.where(least(distance), bearing, math.inf)))
+    # Several points may be at one place.
+    nearest = nearest[np.unique(keys[nearest], return_index=True)[1]]
+    away = signed_degrees(bearing - np.repeat(bearing[nearest], sizes))
+    extent[grouped[nearest]] = np.maximum.reduceat(away, starts) - np.minimum.reduceat(away, starts)
+    shown = np.ones(len(group), np.bool_)
+    shown[grouped] = False
+    shown[grouped[nearest]] = True
+    return replace(pairs, extent=extent).take(shown)
 
 
 def clockwise_order(pairs: SightingPairs, codes: NDArray[np.uint8]) -> NDArray[np.int64]:
@@ -118,7 +159,8 @@ class VisibleObjects:
 
     The entries of place ``i`` are ``offsets[i]`` to ``offsets[i + 1]``. `objects` are rows in the
     table of objects, -1 if unknown; `codes` are their classes; `bearings` are in degrees clockwise
-    from grid north, `distances` in metres.
+    from grid north, `distances` in metres. `extents` are the angular widths of extended things in
+    degrees, 0 for points; None if there are none.
     """
 
     offsets: NDArray[np.int64]
@@ -126,6 +168,7 @@ class VisibleObjects:
     codes: NDArray[np.uint8]
     bearings: NDArray[np.float64]
     distances: NDArray[np.float64]
+    extents: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.offsets) - 1
@@ -153,7 +196,9 @@ def visible_objects_at(
     ranges = objects.taxonomy.ranges(radius)[codes]
     places = np.ascontiguousarray(places, dtype=np.float64)
     candidates = index.pairs_within(places, radius=float(ranges.max()))
-    pairs = measure_sightings(*candidates, places, xy, ranges=ranges, footprints=footprints)
+    pairs = measure_sightings(
+        *candidates, places, xy, ranges=ranges, footprints=footprints, groups=objects.groups
+    )
     order = clockwise_order(pairs, codes)
     lengths = np.bincount(pairs.viewpoint, minlength=len(places))
     rows = pairs.object[order]
@@ -163,4 +208,5 @@ def visible_objects_at(
         codes=codes[rows],
         bearings=pairs.bearing[order],
         distances=pairs.distance[order],
+        extents=None if pairs.extent is None else pairs.extent[order],
     )

@@ -29,7 +29,12 @@ from semsig_gis.core import (
 )
 from semsig_gis.database.cells import build_cells
 from semsig_gis.database.city import open_city
-from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
+from semsig_gis.database.database import (
+    ENTRY_ARRAYS,
+    entry_values,
+    join_databases,
+    require_same,
+)
 from semsig_gis.database.file import (
     INPUTS,
     database_specs,
@@ -144,7 +149,7 @@ def compare_cells(before: SignatureDatabase, after: SignatureDatabase) -> CellCh
     old, new = before.select(old_rows[comparable]), after.select(new_rows[comparable])
     entry_differs = np.zeros(len(old.codes), bool)
     for name in ENTRY_ARRAYS:
-        entry_differs |= getattr(old, name) != getattr(new, name)
+        entry_differs |= entry_values(old, name) != entry_values(new, name)
     differs[np.repeat(comparable, old.lengths)[entry_differs]] = True
     common = np.stack([old_rows, new_rows], axis=1)
     return CellChanges(

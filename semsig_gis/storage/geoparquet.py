@@ -337,11 +337,13 @@ def read_geoparquet(
     *,
     kind: str,
     columns: list[str] | None = None,
+    optional: Sequence[str] = (),
     box: Sequence[float] | None = None,
 ) -> tuple[pa.Table, dict[str, Any], CRS]:
     """Return the table, the specs and the CRS of a file written by `write_geoparquet`.
 
-    DatabaseError if it is missing, damaged, or of another kind (``specs["kind"]``). With a box
+    DatabaseError if it is missing, damaged, or of another kind (``specs["kind"]``). Of the
+    `optional` columns, those that the file has are read in addition to `columns`. With a box
     ``xmin, ymin, xmax, ymax``, row groups that do not intersect it are skipped.
     """
     file = Path(path)
@@ -373,6 +375,8 @@ def read_geoparquet(
     if stored != kind:
         raise DatabaseError(f"{file} is a {stored} file; give a {kind} file.")
     try:
+        if columns is not None:
+            columns = [*columns, *(name for name in optional if name in parquet.schema_arrow.names)]
         if box is None:
             # In batches, because the memory of a batch is used again for the next one.
             batches = list(parquet.iter_batches(BATCH_ROWS, columns=columns))

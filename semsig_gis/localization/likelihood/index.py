@@ -525,6 +525,7 @@ def index_fingerprint(database: SignatureDatabase, noise: Noise) -> str:
         database.codes,
         database.bearing_units,
         database.distance_units,
+        *([] if database.extent_units is None else [database.extent_units]),
     ):
         digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()

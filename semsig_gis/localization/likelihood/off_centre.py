@@ -27,7 +27,9 @@ class _CellObjects(NamedTuple):
     """The objects of all cells in units of the database, and what these units are.
 
     `ranges` is by class code, `metres` by distance unit, `east` and `north` of a metre by bearing
-    unit. `step` is the side of a cell in metres.
+    unit. `own`, by class code, is whether only the cell itself has objects of the class: points of
+    an extended thing differ from cell to cell, and far landmarks are rounded to many metres. `step`
+    is the side of a cell in metres.
     """
 
     offsets: NDArray[np.int64]
@@ -35,6 +37,7 @@ class _CellObjects(NamedTuple):
     bearing_units: NDArray[np.uint16]
     distance_units: NDArray[np.uint8]
     ranges: NDArray[np.float64]
+    own: NDArray[np.bool_]
     metres: NDArray[np.float64]
     east: NDArray[np.float64]
     north: NDArray[np.float64]
@@ -49,7 +52,8 @@ def visible_objects_off_centre(
     The points, shape (p, 2), are metres to the east and north of the centre, less than a cell; that
     of cell i and point j is view ``i * len(points) + j``. Objects that come into range there are
     taken from the neighbouring cells on that side. If one of these cells is missing, objects that
-    are out of range there are kept, at their distance.
+    are out of range there are kept, at their distance, as are extended things and landmarks, which
+    are taken only from the cell itself.
     """
     # The row of each neighbour, -1 where there is none; the cells of a column follow each other.
     columns, rows = database.columns[cells].astype(np.int64), database.rows[cells].astype(np.int64)
@@ -60,6 +64,10 @@ def visible_objects_off_centre(
             there = ids[np.minimum(number, len(ids) - 1)] == cell_ids(columns + east, rows + north)
             around[there, AROUND.index((east, north))] = number[there]
             number += there
+    own = np.zeros(256, np.bool_)
+    own[[item.code for item in database.taxonomy.classes if item.tall or item.shape != "point"]] = (
+        True
+    )
     angles = np.radians((np.arange(BEARING_UNITS) + 0.5) * (FULL_TURN / BEARING_UNITS))
     objects = _CellObjects(
         offsets=database.offsets,
@@ -67,6 +75,7 @@ def visible_objects_off_centre(
         bearing_units=database.bearing_units,
         distance_units=database.distance_units,
         ranges=database.taxonomy.ranges(database.spec.radius),
+        own=own,
         # The nearest objects are not at exactly the point.
         metres=database.scale.positive_metres,
         east=np.sin(angles),
@@ -80,30 +89,31 @@ def visible_objects_off_centre(
         parts[int(part[0])] = _objects_from_points(part, around, points, objects)
 
     share_rows(view_part, len(cells), least=CELLS_A_THREAD)
-    lengths, codes, bearings, distances = (
+    lengths, entries, bearings, distances = (
         np.concatenate(values)
         for values in zip(*(parts[first] for first in sorted(parts)), strict=True)
     )
     return VisibleObjects(
         offsets=np.append(0, np.cumsum(lengths)),
-        objects=np.full(len(codes), -1),
-        codes=codes,
+        objects=np.full(len(entries), -1),
+        codes=database.codes[entries],
         bearings=bearings,
         distances=distances,
+        extents=None if database.extents is None else database.extents[entries],
     )
 
 
 @compiled
 def _longer(
-    codes: NDArray[np.uint8],
+    entries: NDArray[np.int64],
     bearings: NDArray[np.float64],
     distances: NDArray[np.float64],
     size: int,
-) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Return copies of the arrays with room for `size` objects."""
-    more = np.empty(size, np.uint8), np.empty(size), np.empty(size)
-    for place in range(len(codes)):
-        more[0][place], more[1][place] = codes[place], bearings[place]
+    more = np.empty(size, np.int64), np.empty(size), np.empty(size)
+    for place in range(len(entries)):
+        more[0][place], more[1][place] = entries[place], bearings[place]
         more[2][place] = distances[place]
     return more
 
@@ -146,11 +156,11 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
     around: NDArray[np.int64],
     points: NDArray[np.float64],
     objects: _CellObjects,
-) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Return the views from all points of the cells ``part[0]`` to ``part[1] - 1``.
 
     `around` has the rows of the cells around each, -1 where there is none. Returns the number of
-    objects by point, and the class code, bearing in degrees and distance of each object.
+    objects by point, and the entry, bearing in degrees and distance of each object.
     """
     offsets, codes, step = objects.offsets, objects.codes, objects.step
     bearing_units, distance_units = objects.bearing_units, objects.distance_units
@@ -166,10 +176,10 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
         most = max(most, total)
     starts = np.empty(len(AROUND) + 1, np.int64)  # where the objects of each cell around start
     x, y, reach = np.empty(most), np.empty(most), np.empty(most)
-    kinds = np.empty(most, np.uint8)
+    listed, kept = np.empty(most, np.int64), np.empty(most, np.bool_)
     sources = np.empty(4, np.int64)
     lengths = np.empty((part[1] - part[0]) * len(points), np.int64)
-    view_codes, bearings, distances = np.empty(0, np.uint8), np.empty(0), np.empty(0)
+    seen, bearings, distances = np.empty(0, np.int64), np.empty(0), np.empty(0)
     view = at = 0
     for cell in range(part[0], part[1]):
         # The objects of the cell and its neighbours, in metres from its centre. If the cell itself
@@ -184,14 +194,14 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
             for entry in range(offsets[row], offsets[row + 1]):
                 metre, angle = metres[distance_units[entry]], bearing_units[entry]
                 x[size], y[size] = metre * east[angle] + right, metre * north[angle] + above
-                kinds[size] = codes[entry]
+                listed[size], kept[size] = entry, objects.own[codes[entry]]
                 reach[size] = ranges[codes[entry]] ** 2
-                if source == OWN or x[size] ** 2 + y[size] ** 2 > reach[size]:
+                if source == OWN or (not kept[size] and x[size] ** 2 + y[size] ** 2 > reach[size]):
                     size += 1
         starts[len(AROUND)] = size
-        if at + size * len(points) > len(view_codes):
-            room = 2 * len(view_codes) + size * len(points) + FIRST_ROOM
-            view_codes, bearings, distances = _longer(view_codes, bearings, distances, room)
+        if at + size * len(points) > len(seen):
+            room = 2 * len(seen) + size * len(points) + FIRST_ROOM
+            seen, bearings, distances = _longer(seen, bearings, distances, room)
         for point in range(len(points)):
             # The cells that are needed: its own, and the neighbours on the side of the point.
             dx, dy = points[point, 0], points[point, 1]
@@ -217,7 +227,7 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
                 for entry in range(starts[sources[number]], starts[sources[number] + 1]):
                     away_x, away_y = x[entry] - dx, y[entry] - dy
                     away = away_x**2 + away_y**2
-                    if away > reach[entry] and not any_distance:
+                    if away > reach[entry] and not any_distance and not kept[entry]:
                         continue
                     # An object that an earlier neighbour sees has been listed with that one.
                     twice = False
@@ -229,9 +239,9 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
                     if twice:
                         continue
                     # East and north for now; `_polar` converts all at once.
-                    view_codes[at], bearings[at], distances[at] = kinds[entry], away_x, away_y
+                    seen[at], bearings[at], distances[at] = listed[entry], away_x, away_y
                     at += 1
             lengths[view] = at - first
             view += 1
     _polar(bearings[:at], distances[:at])
-    return lengths, view_codes[:at], bearings[:at], distances[:at]
+    return lengths, seen[:at], bearings[:at], distances[:at]

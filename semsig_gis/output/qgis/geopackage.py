@@ -29,7 +29,7 @@ from semsig_gis.core import (
     Taxonomy,
     crs_label,
 )
-from semsig_gis.database import database_of
+from semsig_gis.database import EXTENT_UNITS, EXTENTS, database_of
 from semsig_gis.evaluation import identifiability_of
 from semsig_gis.objects import objects_of
 from semsig_gis.storage import parse_json
@@ -134,22 +134,25 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
             )
         specs, crs, fields = _read_specs(path, CELLS)
         chances = [name for name in fields if name.startswith(IDENTIFIABILITY_COLUMNS)]
-        columns = [*CELL_COLUMNS, *(chances if specs["identifiability"] else [])]
+        columns = [
+            *CELL_COLUMNS,
+            *([EXTENTS] if specs.get(EXTENTS) else []),
+            *(chances if specs["identifiability"] else []),
+        ]
         cells = _read_columns(path, CELLS, columns).sort_by("cell_id")
         # Degrees and metres become the integer units of a database again.
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
         scale = DistanceScale.of(taxonomy, specs["signature"]["radius"])
-        signatures = pa.table(
-            {
-                "cell_id": cells["cell_id"],
-                "types": cells["types"],
-                "bearings": _units(cells["bearings"], _bearing_units, most=FULL_TURN),
-                "distances": _units(
-                    cells["distances"], scale.units, most=scale.reach + scale.unit / 2.0
-                ),
-            }
-        )
-        database = database_of(signatures, specs, crs, path=path)
+        far = scale.reach + scale.unit / 2.0
+        signatures = {
+            "cell_id": cells["cell_id"],
+            "types": cells["types"],
+            "bearings": _units(cells["bearings"], _bearing_units, most=FULL_TURN),
+            "distances": _units(cells["distances"], scale.units, most=far),
+        }
+        if EXTENTS in columns:
+            signatures[EXTENTS] = _units(cells[EXTENTS], _extent_units, most=FULL_TURN)
+        database = database_of(pa.table(signatures), specs, crs, path=path)
         identifiability = None
         if specs["identifiability"]:
             try:
@@ -217,6 +220,11 @@ def _read_columns(path: str | Path, layer: str, columns: list[str]) -> pa.Table:
 def _bearing_units(bearings: NDArray[np.float64]) -> NDArray[np.uint16]:
     """Return bearings in degrees as units of a database."""
     return np.rint(bearings * (BEARING_UNITS / FULL_TURN)).astype(np.uint16)
+
+
+def _extent_units(degrees: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return widths in degrees as units of a database."""
+    return np.rint(degrees * (EXTENT_UNITS / FULL_TURN)).astype(np.uint8)
 
 
 def _units(
