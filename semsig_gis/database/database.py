@@ -141,7 +141,9 @@ class SignatureDatabase(Displayed):
     extent_units: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
-        for array in (self.offsets, self.columns, self.rows, *self.entry_arrays.values()):
+        for array in (self.offsets, self.columns, self.rows):
+            array.setflags(write=False)
+        for array in self.entry_arrays.values():
             array.setflags(write=False)
 
     @property
@@ -212,7 +214,9 @@ class SignatureDatabase(Displayed):
     @property
     def extents(self) -> NDArray[np.float64] | None:
         """Angular width of every entry in degrees, shape (m,); None if nothing is extended."""
-        return None if self.extent_units is None else self.extent_units * (FULL_TURN / EXTENT_UNITS)
+        if self.extent_units is None:
+            return None
+        return self.extent_units * np.float64(FULL_TURN / EXTENT_UNITS)
 
     @cached_property
     def is_extended(self) -> bool:
@@ -286,12 +290,11 @@ class SignatureDatabase(Displayed):
         rows = cells if by_row else np.arange(len(self))[cells]
         lengths = self.lengths[rows]
         entries = consecutive(self.offsets[rows], lengths)
-        return replace(
-            self,
-            offsets=np.append(0, np.cumsum(lengths)),
+        arrays: dict[str, Any] = {
             **{name: getattr(self, name)[rows] for name in CELL_ARRAYS},
             **{name: values[entries] for name, values in self.entry_arrays.items()},
-        )
+        }
+        return replace(self, offsets=np.append(0, np.cumsum(lengths)), **arrays)
 
     def types(self, cell: int) -> str:
         """Return the type sequence of a cell, by its row: one symbol per object."""
