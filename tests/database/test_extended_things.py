@@ -83,7 +83,7 @@ def nearest_points(
     objects: StreetObjects, place: NDArray[np.float64], house: shapely.Polygon | None
 ) -> list[tuple[float, float, int, float]]:
     """Return (bearing, distance, class code, extent) of what is seen from a place, by a loop."""
-    seen: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    points_of: dict[tuple[int, int], list[tuple[float, float]]] = {}
     unseen = np.zeros(len(objects), bool)
     if house is not None:
         places = np.repeat(place[None], len(objects), axis=0)
@@ -96,9 +96,9 @@ def nearest_points(
             continue
         bearing = float(np.round(bearings(dx, dy), 9)) % 360.0
         number = groups[row] if groups[row] >= 0 else -1 - row
-        seen.setdefault((code, number), []).append((distance, bearing))
+        points_of.setdefault((code, number), []).append((distance, bearing))
     things = []
-    for (code, _), all_points in seen.items():
+    for (code, _), all_points in points_of.items():
         distance, bearing = min(all_points)
         away = [float(signed_degrees(other - bearing)) for _, other in all_points]
         things.append((bearing, distance, code, max(away) - min(away)))
@@ -158,9 +158,9 @@ def test_off_centre_views_have_each_extended_thing_once() -> None:
     cells = np.arange(len(database))
     points = np.array([[2.0, 2.0], [-2.0, -2.0]])
     views = visible_objects_off_centre(database, cells, points)
-    seen = np.add.reduceat(views.codes == 230, views.offsets[:-1])
+    counts = np.add.reduceat(views.codes == 230, views.offsets[:-1])
     own = np.add.reduceat(database.codes == 230, database.offsets[:-1])
-    assert seen.tolist() == np.repeat(own, 2).tolist()
+    assert counts.tolist() == np.repeat(own, 2).tolist()
     assert views.extents is not None
     assert database.extents is not None
     assert views.extents.max() == database.extents.max() > 0.0

@@ -176,10 +176,10 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
         most = max(most, total)
     starts = np.empty(len(AROUND) + 1, np.int64)  # where the objects of each cell around start
     x, y, reach = np.empty(most), np.empty(most), np.empty(most)
-    listed, kept = np.empty(most, np.int64), np.empty(most, np.bool_)
+    numbers, stays = np.empty(most, np.int64), np.empty(most, np.bool_)
     sources = np.empty(4, np.int64)
     lengths = np.empty((part[1] - part[0]) * len(points), np.int64)
-    seen, bearings, distances = np.empty(0, np.int64), np.empty(0), np.empty(0)
+    entries, bearings, distances = np.empty(0, np.int64), np.empty(0), np.empty(0)
     view = at = 0
     for cell in range(part[0], part[1]):
         # The objects of the cell and its neighbours, in metres from its centre. If the cell itself
@@ -194,14 +194,14 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
             for entry in range(offsets[row], offsets[row + 1]):
                 metre, angle = metres[distance_units[entry]], bearing_units[entry]
                 x[size], y[size] = metre * east[angle] + right, metre * north[angle] + above
-                listed[size], kept[size] = entry, objects.own[codes[entry]]
+                numbers[size], stays[size] = entry, objects.own[codes[entry]]
                 reach[size] = ranges[codes[entry]] ** 2
-                if source == OWN or (not kept[size] and x[size] ** 2 + y[size] ** 2 > reach[size]):
+                if source == OWN or (not stays[size] and x[size] ** 2 + y[size] ** 2 > reach[size]):
                     size += 1
         starts[len(AROUND)] = size
-        if at + size * len(points) > len(seen):
-            room = 2 * len(seen) + size * len(points) + FIRST_ROOM
-            seen, bearings, distances = _longer(seen, bearings, distances, room)
+        if at + size * len(points) > len(entries):
+            room = 2 * len(entries) + size * len(points) + FIRST_ROOM
+            entries, bearings, distances = _longer(entries, bearings, distances, room)
         for point in range(len(points)):
             # The cells that are needed: its own, and the neighbours on the side of the point.
             dx, dy = points[point, 0], points[point, 1]
@@ -227,7 +227,7 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
                 for entry in range(starts[sources[number]], starts[sources[number] + 1]):
                     away_x, away_y = x[entry] - dx, y[entry] - dy
                     away = away_x**2 + away_y**2
-                    if away > reach[entry] and not any_distance and not kept[entry]:
+                    if away > reach[entry] and not any_distance and not stays[entry]:
                         continue
                     # An object that an earlier neighbour sees has been listed with that one.
                     twice = False
@@ -239,9 +239,9 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
                     if twice:
                         continue
                     # East and north for now; `_polar` converts all at once.
-                    seen[at], bearings[at], distances[at] = listed[entry], away_x, away_y
+                    entries[at], bearings[at], distances[at] = numbers[entry], away_x, away_y
                     at += 1
             lengths[view] = at - first
             view += 1
     _polar(bearings[:at], distances[:at])
-    return lengths, seen[:at], bearings[:at], distances[:at]
+    return lengths, entries[:at], bearings[:at], distances[:at]
