@@ -158,6 +158,7 @@ from .tables import markdown_rows as markdown_rows
 from .taxonomy import MAX_CODE as MAX_CODE
 from .taxonomy import MAX_HEIGHT_M as MAX_HEIGHT_M
 from .taxonomy import MAX_RANGE_M as MAX_RANGE_M
+from .taxonomy import UNKNOWN_NAME as UNKNOWN_NAME
 from .taxonomy import WILDCARD as WILDCARD
 from .taxonomy import ObjectClass as ObjectClass
 from .taxonomy import Taxonomy as Taxonomy

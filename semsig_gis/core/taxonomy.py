@@ -37,6 +37,8 @@ LETTERS = (
 Shape = Literal["point", "line", "area"]
 WILDCARD = 0
 """Code of an object of unknown class."""
+UNKNOWN_NAME = "unknown"
+"""Name of any class, in views and explanations."""
 MAX_RANGE_M = 6000.0
 MAX_HEIGHT_M = 500.0
 
@@ -289,6 +291,20 @@ class Taxonomy(Displayed):
         """Return the symbols of class codes, shape (n,), the inverse of `encode`."""
         points = self.symbol_points[np.asarray(codes, dtype=np.uint8)]
         return points.tobytes().decode("utf-32-le")
+
+    def title_of(self, name: str) -> str:
+        """Return the title of what an object was said to be (see `View.class_names`).
+
+        >>> from semsig_gis import paper_taxonomy
+        >>> taxonomy = paper_taxonomy()
+        >>> [taxonomy.title_of(name) for name in ("shop", "bus_stop or bench", "unknown")]
+        ['Shop', 'Bus stop or bench', 'Something']
+        """
+        titles = {item.name: item.title for item in self.classes} | {UNKNOWN_NAME: "Something"}
+        first, *rest = (
+            titles.get(part, part.replace("_", " ").capitalize()) for part in name.split(" or ")
+        )
+        return " or ".join([first, *map(str.lower, rest)])
 
     def words(self, codes: ArrayLike) -> str:
         """Return the titles of class codes, shape (n,), for people.

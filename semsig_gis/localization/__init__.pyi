@@ -67,7 +67,6 @@ from .likelihood.elsewhere import goodness_of_fit as goodness_of_fit
 from .likelihood.estimate import PlaceEstimate as PlaceEstimate
 from .likelihood.estimate import cell_estimate as cell_estimate
 from .likelihood.estimate import refined_estimate as refined_estimate
-from .likelihood.explain import UNKNOWN_NAME as UNKNOWN_NAME
 from .likelihood.explain import VERDICTS as VERDICTS
 from .likelihood.explain import Explanation as Explanation
 from .likelihood.explain import explain as explain

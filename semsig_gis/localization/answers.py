@@ -14,7 +14,6 @@ from typing_extensions import TypedDict
 
 from semsig_gis.core import (
     LICENSES,
-    WILDCARD,
     Displayed,
     InputError,
     SignatureRecord,
@@ -249,21 +248,20 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     notes = query.notes if isinstance(query, View) else ()
     if not len(query):
         return ("nothing was seen, which says little about the place.", *notes)
+    words = [taxonomy.title_of(name).lower() for name in View.of(query).class_names(taxonomy)]
     if isinstance(query, View) and query.bearings is not None and len(outside := query.outside()):
-        codes = np.full(len(query), WILDCARD) if query.codes is None else query.codes
         listed = ", ".join(
-            f"{taxonomy.words([codes[row]])} at {query.bearings[row]:.1f}°"
-            for row in outside.tolist()
+            f"{words[row]} at {query.bearings[row]:.1f}°" for row in outside.tolist()
         )
         note = (
             f"{listed} {'is' if len(outside) == 1 else 'are'} outside the sectors that were looked "
             "at; the heading, the field of view or the bearing may be wrong."
         )
         notes = (note, *notes)
-    lacking = [] if query.codes is None else query.codes[~query.among(present)].tolist()
+    lacking = [words[row] for row in np.flatnonzero(~query.among(present)).tolist()]
     if not lacking:
         return notes
-    names = " and no ".join(taxonomy.words([code]) for code in dict.fromkeys(lacking))
+    names = " and no ".join(dict.fromkeys(lacking))
     used = "this object was" if len(lacking) == 1 else f"these {len(lacking)} objects were"
     return (f"the map has no {names}, so {used} not used.", *notes)
 

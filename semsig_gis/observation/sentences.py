@@ -233,8 +233,9 @@ def _columns_view(values: Row, taxonomy: Taxonomy, radius: float) -> View:
     if chances := mappings(values.get("scores", []), "scores"):
         scores = np.stack([_scores(item, taxonomy) for item in chances])
         if codes is None:
-            # The likeliest class; with equal scores, a named class before "any class".
-            best = scores[:, 1:].max(axis=1) >= scores[:, WILDCARD]
+            # The likeliest class, before "any class"; none of several with equal scores.
+            most = scores[:, 1:].max(axis=1, keepdims=True)
+            best = (most[:, 0] >= scores[:, WILDCARD]) & ((scores[:, 1:] == most).sum(axis=1) == 1)
             codes = np.where(best, 1 + scores[:, 1:].argmax(axis=1), WILDCARD).astype(np.uint8)
     bearings = wrapped_bearings(angles) if angles else None
     if bearings is None and (codes is None or not len(codes)):

@@ -17,6 +17,7 @@ from semsig_gis.core import (
     FULL_TURN,
     MAX_CODE,
     MAX_RANGE_M,
+    UNKNOWN_NAME,
     WILDCARD,
     InputError,
     Signature,
@@ -398,6 +399,26 @@ class View(Signature):
         codes = np.full(len(self), WILDCARD) if self.codes is None else self.codes
         return np.eye(CLASSES)[codes]
 
+    def class_names(self, taxonomy: Taxonomy) -> list[str]:
+        """Return what each object is said to be: a class, a family, or some classes.
+
+        It is the name of the likeliest class or, of classes with equal scores, that of their
+        family, if they are all of its classes, or their names with "or" between them; ``unknown``
+        for an object of any class.
+        """
+        families: dict[frozenset[int], str] = {}
+        for family in {item.family for item in taxonomy.classes} - {""}:
+            families[frozenset(taxonomy.family_codes(family).tolist())] = family
+        found = []
+        for row in self.class_scores():
+            best = np.flatnonzero(row == row.max()).tolist()
+            if len(best) > 1 and WILDCARD in best:
+                best.remove(WILDCARD)
+            family = families.get(frozenset(best), "") if len(best) > 1 else ""
+            names = (taxonomy.by_code(code).name if code else UNKNOWN_NAME for code in best)
+            found.append(family or " or ".join(names))
+        return found
+
     def among(self, codes: ArrayLike) -> NDArray[np.bool_]:
         """Return a mask of objects that may be of these classes, or any class, shape (n,)."""
         if self.scores is None:
@@ -452,7 +473,7 @@ class View(Signature):
         if self.bearing_errors is not None:
             values["bearing_errors"] = _none_for_nan(self.bearing_errors)
         if self.scores is not None:
-            names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: "unknown"}
+            names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: UNKNOWN_NAME}
             values["scores"] = [
                 {names[code]: float(row[code]) for code in np.flatnonzero(row).tolist()}
                 for row in self.scores

@@ -139,16 +139,24 @@ def goodness_of_fit(
         inside = look.sees(BINS) if look.sectors else np.ones(len(BINS), np.bool_)
         rows = ((detections.bearings + heading) % FULL_TURN).astype(np.int64)
         errors = detections.bearing_errors.tolist()
+        means, sums, logs_of = {}, {}, {}  # by error
+        for error in {*errors}:
+            means[error], *parts = (_blurred(values, error) for values in (mean, *densities))
+            sums[error] = [np.cumsum(part[:, inside]) for part in parts]
+            logs_of[error] = np.log(means[error])
         for row, error, scores in zip(rows.tolist(), errors, detections.scores.T, strict=True):
-            blurred_mean, *blurred = (_blurred(values, error) for values in (mean, *densities))
-            total += math.log(scores @ blurred_mean[:, row])
+            blurred_mean, logs = means[error], logs_of[error]
+            # Of an unknown class, or any of some, only the direction is compared.
+            named = scores > 0.0
+            same = (scores[named] == scores[named][0]).all()
+            share = scores[named][0] if same else 1.0
+            total += math.log(scores @ blurred_mean[:, row] / share)
             bins = []
-            for density, count in zip(blurred, counts.tolist(), strict=True):
-                chances = np.cumsum(density[:, inside])
+            for chances, count in zip(sums[error], counts.tolist(), strict=True):
                 bins.append(np.searchsorted(chances, random.random(count) * chances[-1]))
-            # Of an object of unknown class, only the direction is compared.
-            of_any = blurred_mean.sum(axis=0) + 0.0 * blurred_mean
-            logs = np.log(of_any if scores.all() else blurred_mean)
+            if (same and named.sum() > 1) or named.all():
+                any_of_them = np.log(blurred_mean[named].sum(axis=0))
+                logs = np.where(named[:, None], any_of_them, logs)
             simulated += logs[:, inside].ravel()[np.concatenate(bins)]
     return float(np.mean(simulated <= total + ROUNDING))
 

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from semsig_gis.objects import StreetObjects
     from semsig_gis.observation import North
 
-UNKNOWN_NAME = "unknown"
 LEAST_PAIR_CHANCE = 0.01  # that a detection is an object, to list them in one row
 LEAST_INSIDE = 0.5  # chance that the bearing of an object is in a sector, to count it as inside
 Verdict = Literal["matched", "misnamed", "missed", "false"]
@@ -330,26 +329,27 @@ class _Scene:
     ) -> list[dict[str, Any]]:
         """Return a row for each object of the query of a known class."""
         bearings = query_bearings(query)
-        codes = query.class_scores().argmax(axis=1)
+        scores, names = query.class_scores(), query.class_names(self.taxonomy)
+        likeliest = scores == scores.max(axis=1, keepdims=True)
         ranges = np.full(len(query), np.nan) if query.ranges is None else query.ranges
         rows = []
         for number in np.flatnonzero(query.among(self.codes)).tolist():
-            code, metres = int(codes[number]), float(ranges[number])
+            metres = float(ranges[number])
             row: dict[str, Any] = {
                 "verdict": "false",
                 "chance": max(1.0 - float(chances[:, number].sum()), 0.0),
                 "query": number,
                 "photo": int(query.photo_rows[number]) if len(query.photos) > 1 else None,
-                "query_class": self._class_name(code),
+                "query_class": names[number],
                 "query_bearing": float(bearings[number]),
                 "query_range": None if math.isnan(metres) else metres,
             }
             if number in partners:
                 entry = partners[number]
-                other = code not in {WILDCARD, int(self.view.codes[entry])}
+                same = likeliest[number, [WILDCARD, self.view.codes[entry]]].any()
                 away = signed_degrees(bearings[number] - self.view.bearings[entry])
                 row |= {
-                    "verdict": "misnamed" if other else "matched",
+                    "verdict": "matched" if same else "misnamed",
                     "chance": float(chances[entry, number]),
                     "bearing_error": float(away),
                     **self._object(entry),
@@ -362,7 +362,7 @@ class _Scene:
         view = self.view
         bearing, distance = float(view.bearings[entry]), float(view.distances[entry])
         facts: dict[str, Any] = {
-            "object_class": self._class_name(int(view.codes[entry])),
+            "object_class": self.taxonomy.by_code(int(view.codes[entry])).name,
             "object_bearing": bearing,
             "distance": distance,
         }
@@ -379,9 +379,6 @@ class _Scene:
             "source_id": str(table[SOURCE_ID].iloc[row]),
             "place": tuple(self.objects.xy[row].tolist()),
         }
-
-    def _class_name(self, code: int) -> str:
-        return UNKNOWN_NAME if code == WILDCARD else self.taxonomy.by_code(code).name
 
 
 def _partners(chances: NDArray[np.float64]) -> dict[int, int]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
-from semsig_gis.core import InputError, cell_ids, export_with, map_with, percent
+from semsig_gis.core import FULL_TURN, InputError, cell_ids, export_with, map_with, percent
 from semsig_gis.localization.answers import (
     LEAST_ELSEWHERE,
     REGION_SHARE,
@@ -39,7 +39,6 @@ from semsig_gis.localization.likelihood.elsewhere import (
 from semsig_gis.localization.likelihood.estimate import cell_estimate, refined_estimate
 from semsig_gis.localization.likelihood.explain import (
     IN_WORDS,
-    UNKNOWN_NAME,
     explain,
     explain_cell,
 )
@@ -258,9 +257,7 @@ class Location(Answer):
         def described(name: str | None, bearing: float | None, metres: float | None) -> str:
             if name is None:
                 return ""
-            title = "something"
-            if name != UNKNOWN_NAME:
-                title = self.taxonomy.by_name(name).title.lower()
+            title = self.taxonomy.title_of(name).lower()
             at = "" if bearing is None else f" at {bearing:.0f}°"
             return f"{title}{at}" + ("" if metres is None else f", {metres:.0f} m")
 
@@ -533,10 +530,17 @@ class LikelihoodLocator:
             )
 
     def _usable_objects(self, query: Signature) -> Signature:
-        """Return a query with bearings from grid north, without classes that no cell sees."""
+        """Return a query with bearings from grid north, without classes that no cell sees.
+
+        Objects that may be of several classes, without bearings, are in any direction.
+        """
         query = self.north.to_grid(query)
         usable = query.among(self.index.database.present_codes)
-        return query if usable.all() else query.select(usable)
+        query = query if usable.all() else query.select(usable)
+        if query.bearings is None and isinstance(query, View) and query.scores is not None:
+            anywhere = np.zeros(len(query)), np.full(len(query), FULL_TURN / 2.0)
+            return replace(query, bearings=anywhere[0], bearing_errors=anywhere[1])
+        return query
 
     def scan(self, query: Signature) -> CellScores:
         """Return the scores of all cells by the sum over detections one by one."""

@@ -92,6 +92,11 @@ class PhotoTable:
             any_class = photo.scores[:, WILDCARD]
             shared = np.where(any_class < 1.0, any_class / len(table.codes), 1.0)
             scores = photo.scores[:, table.codes].T + shared
+            # Classes that no cell sees cannot be meant: the others share their chance.
+            absent = np.delete(photo.scores, [WILDCARD, *table.codes], axis=1).sum(axis=1)
+            nowhere = np.flatnonzero(scores.sum(axis=0) == 0.0)
+            table.class_rows(photo.scores[nowhere].argmax(axis=1).astype(np.uint8))  # raises
+            scores[:, absent > 0.0] /= scores.sum(axis=0)[absent > 0.0]
         errors = unknown if photo.range_errors is None else photo.range_errors
         rough = np.zeros(size) if photo.bearing_errors is None else photo.bearing_errors
         (look,) = photo.photos

@@ -20,7 +20,7 @@ _Families = dict[str, list[str]]
 
 
 def noise_by_class(noise: Noise, taxonomy: Taxonomy, present: Collection[int]) -> Noise:
-    """Return a noise model whose tables name only classes of a taxonomy, and no families.
+    """Return a noise model with tables that name only classes of a taxonomy, and no families.
 
     The value of a family goes to each of its classes that has no entry of its own. A share of a
     family is divided equally among these classes, those with a code in `present` if there are any.

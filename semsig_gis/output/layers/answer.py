@@ -12,7 +12,7 @@ import shapely
 
 from semsig_gis.core import VERDICTS, place_links
 from semsig_gis.database import CellTable
-from semsig_gis.localization import UNKNOWN_NAME, Location
+from semsig_gis.localization import Location
 from semsig_gis.output.layers.buildings import buildings_layer
 from semsig_gis.output.layers.columns import form_of
 from semsig_gis.output.layers.model import Display, table_layer
@@ -311,21 +311,23 @@ def explanation_rows(location: Location, explanation: Explanation) -> list[dict[
     of the street object or, without one, that end. Bearings are from grid north.
     """
     database = location.posterior.database
-    titles = {item.name: item.title for item in database.taxonomy.classes}
-    titles[UNKNOWN_NAME] = "Something"
+
+    def title(name: str | None) -> str | None:
+        return None if name is None else database.taxonomy.title_of(name)
+
     ends = explanation.ends(database.near_reach).tolist()
     return [
         {
             "verdict": row["verdict"],
             "chance": row["chance"],
             "class": row["object_class"] or row["query_class"],
-            "title": titles[row["object_class"] or row["query_class"]],
+            "title": title(row["object_class"] or row["query_class"]),
             "seen_class": row["query_class"],
-            "seen_title": titles.get(row["query_class"]),
+            "seen_title": title(row["query_class"]),
             "seen_bearing": row["query_bearing"],
             "seen_range": row["query_range"],
             "object_class": row["object_class"],
-            "object_title": titles.get(row["object_class"]),
+            "object_title": title(row["object_class"]),
             "bearing": row["object_bearing"],
             "distance": row["distance"],
             "bearing_error": row["bearing_error"],

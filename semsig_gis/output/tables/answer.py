@@ -7,6 +7,8 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from semsig_gis.core import Table, figure, percent, signed_degrees, to_degrees
 from semsig_gis.localization import VERDICTS, Location
 from semsig_gis.observation import GRID_NORTH, View
@@ -290,13 +292,13 @@ def _known_sentences(knowledge: Mapping[str, Any]) -> Iterator[str]:
 def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
     """Return an object of a query: ``street light at 80° ± 13° 7.3 m away``."""
     parts = []
-    if view.scores is not None:
-        scores = enumerate(view.scores[row].tolist())
-        parts.append(
-            " or ".join(f"{taxonomy.words([code])} {score:.2g}" for code, score in scores if score)
-        )
+    one = view.select(np.array([row]))
+    scores = one.class_scores()[0].tolist()
+    if len({*scores} - {0.0}) > 1:
+        listed = ((taxonomy.words([code]), score) for code, score in enumerate(scores) if score)
+        parts.append(" or ".join(f"{words} {score:.2g}" for words, score in listed))
     else:
-        parts.append("something" if view.codes is None else taxonomy.words([view.codes[row]]))
+        parts += [taxonomy.title_of(name).lower() for name in one.class_names(taxonomy)]
     if view.bearings is not None:
         error = math.nan if view.bearing_errors is None else view.bearing_errors[row]
         spread = "" if math.isnan(error) else f" ± {error:.2g}°"
@@ -336,7 +338,9 @@ def _explanation_table(rank: int, explanation: Explanation, answer: Location) ->
     title = f"Place {rank}, {lat:.6f}, {lon:.6f} (lat, lon): {summary}."
     if rank > 1:
         return title
-    names = {item.name: item.title.lower() for item in answer.taxonomy.classes}
+
+    def said(name: str | None) -> str:
+        return "" if name is None else answer.taxonomy.title_of(name).lower()
 
     def measure(value: float | None, spec: str, unit: str, before: str = "") -> str:
         return "" if value is None else f"{before}{value:{spec}}{unit}"
@@ -355,9 +359,9 @@ def _explanation_table(rank: int, explanation: Explanation, answer: Location) ->
             (
                 row["verdict"],
                 f"{row['chance']:.2f}",
-                names.get(row["query_class"], row["query_class"] or ""),
+                said(row["query_class"]),
                 bearing_text(row["query_bearing"]) + measure(row["query_range"], ".1f", " m", ", "),
-                names.get(row["object_class"], ""),
+                said(row["object_class"]),
                 bearing_text(row["object_bearing"]),
                 measure(row["bearing_error"], "+.1f", "°"),
                 measure(row["distance"], ".1f", " m"),
