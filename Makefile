@@ -18,7 +18,7 @@ BIOME := @biomejs/biome@2.6.8
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test coverage busy test-all pythons oldest size lint bench accuracy views bayes chances photographs reproduce golden soak stranger walks docs pictures plugin dist clean
+.PHONY: help demo test coverage busy test-all pythons oldest size lint bench accuracy views bayes chances see-more photographs reproduce golden soak stranger walks docs pictures plugin dist clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
@@ -93,6 +93,10 @@ bayes: $(DEV) ## upper bound for all methods, by exact sums in a small city: fig
 
 chances: $(DEV) ## whether stated chances come true, on old maps too: figures, an hour
 	$(BIN)/python -m benchmarks.chances
+	$(BIN)/python -m benchmarks.tables
+
+see-more: $(DEV) ## what more kinds of things on the map are worth: figures, hours
+	$(BIN)/python -m benchmarks.see_more
 	$(BIN)/python -m benchmarks.tables
 
 photographs: $(DEV) ## methods on the real photographs in SEMSIG_GEODATA: figures, half an hour

@@ -3,7 +3,7 @@
 In real cities a person finds 70 % of the things that are seen from anywhere in a street cell,
 misnames 5 % of them, is 8 degrees out and makes up few. The likelihood method has this noise model.
 The views are from the same places for every line; what is on the map, and so in the views, grows
-from line to line. Results are written to ``benchmarks/see_more.json``, line by line. Lines that are
+from line to line. Results are labels to ``benchmarks/see_more.json``, line by line. Lines that are
 there are not measured again, so that an interrupted run continues. Places are not refined.
 """
 
@@ -14,19 +14,20 @@ import itertools
 import math
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+import shapely
 
 from benchmarks._accuracy_rows import Bar
 from benchmarks._measuring import add_geodata, option_parser, read_rows, short, write_rows
 from benchmarks.views import KNOWN, NORTHS
-from semsig_gis.core import Taxonomy, wilson_interval
-from semsig_gis.database import build, open_city
+from semsig_gis.core import NAME, Taxonomy, wilson_interval
+from semsig_gis.database import build, open_city, visible_objects_at
 from semsig_gis.evaluation import QuerySpec, calibration_bins, draw_queries, parse_chain
 from semsig_gis.localization import (
     DEFAULT_RULE,
@@ -37,9 +38,13 @@ from semsig_gis.localization import (
     cell_noise,
 )
 from semsig_gis.objects import Loaded, StreetObjects, load
+from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
+    import geopandas as gpd
+    from numpy.typing import NDArray
 
     from semsig_gis.core import ObjectClass, Signature
     from semsig_gis.database import City
@@ -58,9 +63,12 @@ BEFORE = frozenset(range(1, 30)) - {23, 24, 25}
 SHOPS = frozenset({"shop", "food", "service", "worship"})
 CORNERS, JUNCTIONS, LANDMARKS = "building", "junction", "landmark"
 NEAR_M, THIN_M = DEFAULT_RULE.radius, 100.0
+READ = 0.5  # share of the names
+ON_STREET_M, SAME_M = 15.0, 1e-6
 PARTS = 16  # of the views of a line, for the processes
 # The targets: times the share of before, where it is low; shares; and the gap of chances.
 LOW_SHARE, TIMES, LEAST_RIGHT, MOST_GAP = 0.4, 2.0, 0.96, 0.05
+MORE, MOST_SHARE = 0.1, 0.97  # more with names, but not above this share
 ENOUGH = 50  # answers; the share of fewer that is right says little
 
 
@@ -68,12 +76,14 @@ ENOUGH = 50  # answers; the share of fewer that is right says little
 class Line:
     """What is on the map: the first `steps` kinds of things, or only those of a `thin` place.
 
-    Answers within `radius` metres are right.
+    With `names`, half of the names of shops and streets are read. Answers within `radius` metres
+    are right.
     """
 
     name: str
     steps: int = 0
     thin: bool = False
+    names: bool = False
     radius: float = NEAR_M
 
     def has(self, item: ObjectClass) -> bool:
@@ -93,8 +103,10 @@ TODAY, FURNITURE, WITH_SHOPS, WITH_JUNCTIONS, EXTENDED, FAR, WITH_CORNERS = STEP
 )
 THIN = frozenset(map(STEPS.index, (WITH_JUNCTIONS, FAR, WITH_CORNERS)))
 THIN_PLACE = "only junctions, buildings and landmarks"
+NAMES_READ = "up to junctions, half of the names read"
 LINES = (
     *(Line(name=name, steps=number) for number, name in enumerate(STEPS, start=1)),
+    Line(name=NAMES_READ, steps=STEPS.index(WITH_JUNCTIONS) + 1, names=True),
     Line(name=THIN_PLACE, thin=True, radius=THIN_M),
 )
 
@@ -183,6 +195,8 @@ def _rows(
             city = build(part, path, viewpoints="streets")
             for _, north in norths:
                 questions = _questions(city, everything, north, count)
+                if line.names:
+                    questions = _with_names(questions, everything)
                 parts = [questions[start::PARTS] for start in range(min(PARTS, count))]
                 answer = functools.partial(_answers, str(path), north, line.radius)
                 answers = pd.concat(pool.map(answer, parts))
@@ -212,10 +226,11 @@ def _objects(objects: StreetObjects, line: Line) -> StreetObjects | None:
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class _Question:
-    """A view and its true place."""
+    """A view and its true place; `distances` are those of its objects, NaN of false ones."""
 
     view: Signature
     xy: tuple[float, float]
+    distances: NDArray[np.float64]
 
 
 def _questions(city: City, everything: City, north: str, count: int) -> list[_Question]:
@@ -235,7 +250,67 @@ def _questions(city: City, everything: City, north: str, count: int) -> list[_Qu
         city=everything.database,
         part=slice(count),
     )
-    return [_Question(view=query.asked.signature, xy=query.xy) for query in queries]
+    questions = []
+    for query in queries:
+        sight = query.asked
+        false = np.zeros(len(sight), np.bool_) if sight.false is None else sight.false
+        distances = np.where(false, np.nan, sight.distances)
+        questions.append(_Question(view=sight.signature, xy=query.xy, distances=distances))
+    return questions
+
+
+def _with_names(questions: Sequence[_Question], city: City) -> list[_Question]:
+    """Return questions with half of the names of shops and of the streets that they are on."""
+    objects, streets = city.store.objects, city.store.streets
+    families = {item.code: item.family for item in objects.taxonomy.classes}
+    columns = objects.texts
+    labels = [""] * len(objects)
+    if columns is not None and NAME in columns.column_names:
+        labels = [text or "" for text in columns[NAME].to_pylist()]
+    rng = np.random.default_rng(0)
+    results = []
+    for question in questions:
+        rows = _rows_seen(question, city)
+        names = [
+            labels[row]
+            if row >= 0 and families[int(objects.codes[row])] in SHOPS and rng.random() < READ
+            else ""
+            for row in rows
+        ]
+        signs: tuple[str, ...] = ()
+        if streets is not None and rng.random() < READ:
+            street = _street_at(question.xy, streets)
+            signs = (street,) if street else ()
+        view = replace(View.of(question.view), texts=tuple(names), signs=signs)
+        results.append(replace(question, view=view))
+    return results
+
+
+def _rows_seen(question: _Question, city: City) -> list[int]:
+    """Return the row of each object of a view, by its true distance; -1 for a false one."""
+    place, store, database = np.array([question.xy]), city.store, city.database
+    views = visible_objects_at(
+        store.objects,
+        place,
+        index=store.index,
+        radius=database.spec.radius,
+        footprints=store.buildings_around(place, distance=database.reach),
+    )
+    rows = []
+    for distance in question.distances.tolist():
+        gaps = np.abs(views.distances - distance)
+        # The gap to the NaN of a false object is NaN, too.
+        same = np.flatnonzero(gaps < SAME_M)
+        rows.append(int(views.objects[same[0]]) if len(same) else -1)
+    return rows
+
+
+def _street_at(xy: tuple[float, float], streets: gpd.GeoDataFrame) -> str:
+    """Return the name of the street of a place; empty if there is none, or none near."""
+    (nearest,) = streets.sindex.nearest(
+        shapely.Point(xy), return_all=False, return_distance=False, max_distance=ON_STREET_M
+    )[1:]
+    return str(streets[NAME].iloc[int(nearest[0])]) if len(nearest) else ""
 
 
 @functools.cache
@@ -244,6 +319,7 @@ def _locator(path: str, north: str, radius: float) -> LikelihoodLocator:
     database = city.database
     return LikelihoodLocator(
         index=build_index(database, cell_noise(PERSON, database.grid.step)),
+        store=city.store,  # for names
         north_sigma=NORTHS[north][1],
         rule=AnswerRule(threshold=DEFAULT_RULE.threshold, radius=radius),
         top=1,
@@ -256,8 +332,8 @@ def _answers(path: str, north: str, radius: float, questions: Sequence[_Question
     locator = _locator(path, north, radius)
     rows = []
     for question in questions:
-        row = {"seen": float(len(question.view)), "right": 0.0, "chance": 0.0}
-        if len(question.view):
+        row = {"seen": float(len(question.view)), "right": 0.0, "chance": math.nan}
+        if len(question.view) or View.of(question.view).signs:
             location = locator.locate(question.view)
             error = math.dist((location.answer.x, location.answer.y), question.xy)
             row |= {
@@ -271,7 +347,7 @@ def _answers(path: str, north: str, radius: float, questions: Sequence[_Question
 
 def _figures(answers: pd.DataFrame) -> dict[str, Any]:
     """Return the figures of a line; ``gap`` is how far off the chances are, on the average."""
-    usable = answers[answers["seen"] > 0]
+    usable = answers[answers["chance"].notna()]
     sure = answers["right"][answers["chance"] >= DEFAULT_RULE.threshold]
     near = float(answers["right"].mean())
     low, high = wilson_interval(near, len(answers))
@@ -283,13 +359,13 @@ def _figures(answers: pd.DataFrame) -> dict[str, Any]:
     return {
         "queries": len(answers),
         "detections": short(answers["seen"].mean()),
-        "blind": short(float((answers["seen"] == 0).mean())),
+        "blind": short(1.0 - len(usable) / len(answers)),
         "near": short(near),
         "near_low": short(low),
         "near_high": short(high),
         "answered": len(sure),
         "right": int(sure.sum()),
-        "stated": short(float(answers["chance"].mean())),
+        "stated": short(float(answers["chance"].fillna(0.0).mean())),
         "gap": short(gap),
         "region_m2": short(float(usable["region_m2"].median())) if len(usable) else None,
     }
@@ -315,6 +391,10 @@ def bars(rows: Sequence[dict[str, Any]]) -> Iterator[tuple[str, Bar]]:
         if {TODAY, WITH_JUNCTIONS} <= shares.keys() and shares[TODAY] < LOW_SHARE:
             ratio = shares[WITH_JUNCTIONS] / shares[TODAY] if shares[TODAY] else math.inf
             yield city, Bar(what=f"{WITH_JUNCTIONS}, to {TODAY}", value=ratio, low=TIMES)
+        if {NAMES_READ, WITH_JUNCTIONS} <= shares.keys():
+            gain = shares[NAMES_READ] - shares[WITH_JUNCTIONS]
+            low = min(MORE, round(MOST_SHARE - shares[WITH_JUNCTIONS], 3))
+            yield city, Bar(what=f"{NAMES_READ}, more than without", value=gain, low=low)
         enough = [row for row in of_city if row["answered"] >= ENOUGH]
         if enough:
             least = min(row["right"] / row["answered"] for row in enough)

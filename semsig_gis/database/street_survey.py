@@ -195,13 +195,14 @@ def survey(
         inside = shapely.intersects_xy(area, objects.xy[:, 0], objects.xy[:, 1])
     families = []
     for number, name in enumerate(names):
-        codes = objects.codes[inside & (family_of[objects.codes] == number)]
+        rows = np.flatnonzero(inside & (family_of[objects.codes] == number))
+        things = _things(objects, rows)
         families.append(
             FamilySurvey(
                 family=name,
-                classes=len(np.unique(codes)),
-                objects=len(codes),
-                per_km=len(codes) / km if along_streets else None,
+                classes=len(np.unique(objects.codes[rows])),
+                objects=things,
+                per_km=things / km if along_streets else None,
                 added=_shares(counts[:, : number + 1].sum(axis=1)),
                 own=_shares(counts[:, number]),
             )
@@ -275,6 +276,14 @@ def _families(objects: StreetObjects) -> tuple[list[str], NDArray[np.int64]]:
     for code in present:
         numbers[code] = names.index(family_of[code])
     return names, numbers
+
+
+def _things(objects: StreetObjects, rows: NDArray[np.int64]) -> int:
+    """Return the number of some objects; the points of an extended thing are one."""
+    if objects.groups is None:
+        return len(rows)
+    groups = objects.groups[rows]
+    return int((groups < 0).sum()) + len(np.unique(groups[groups >= 0]))
 
 
 def _shares(counts: NDArray[np.int64]) -> tuple[float, ...]:

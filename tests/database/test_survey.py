@@ -113,6 +113,13 @@ def test_without_streets_places_are_outdoors() -> None:
     assert last.rows[0] == ("Street furniture", "0", "0", "")
 
 
+def test_the_points_of_an_extended_thing_are_one_object() -> None:
+    points = [(*at(x, 10), 1, "layer", f"way/{x}") for x in (0, 5, 10, 20, 25, 30)]
+    objects = objects_of(*points, licenses=(), taxonomy=CLASSES, group=[0, 0, 0, 7, 7, -1])
+    (furniture,) = survey(loaded(objects, surroundings(STREET))).families
+    assert furniture.objects == 3
+
+
 def test_many_places_are_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
     objects = random_objects(0, (1,))
     monkeypatch.setattr("semsig_gis.database.street_survey.MOST_PLACES", 7)

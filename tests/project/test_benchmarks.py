@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from machine import PATIENCE_S
 from noisy_cells import every_association, random_database
 from view_oracle import cell_loglik, random_view
 
-from benchmarks import bayes, chances, history, stranger, tables, views
+from benchmarks import bayes, chances, history, see_more, stranger, tables, views
 from benchmarks._measuring import FOLDER, INPUTS, LAST_ONLY, read_rows
 from benchmarks.views import NOISE
 from semsig_gis.observation import Photo, View
@@ -152,9 +153,10 @@ def test_a_command_runs_together_with_six_busy_processes() -> None:
 
 
 def test_the_page_of_figures_is_current() -> None:
-    names = ("accuracy", "results", "reproduction", "chances", "views", "bayes")
-    *others, limit = (read_rows(FOLDER / f"{name}.json") for name in names)
-    assert tables.PAGE.read_text(encoding="utf-8") == tables.page(*others, bayes=limit)
+    names = ("accuracy", "results", "reproduction", "chances", "views", "bayes", "see_more")
+    *others, limit, more = (read_rows(FOLDER / f"{name}.json") for name in names)
+    page = tables.page(*others, bayes=limit, see_more=more)
+    assert tables.PAGE.read_text(encoding="utf-8") == page
     trials = read_rows(FOLDER / "soak.json")
     page_of_trust = tables.TRUST.read_text(encoding="utf-8")
     assert page_of_trust == tables.trust_page(page_of_trust, trials)
@@ -230,6 +232,32 @@ def test_views_are_measured_once(
     page = tables.page([], [], [], [], rows, bayes=[])
     assert "as a full turn | sectors | sectors and ranges |" in page
     assert all(bar.what in page for _, bar in views.bars(rows))
+
+
+def test_more_kinds_of_things_are_measured_once(
+    geodata: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / "see_more.json"
+    monkeypatch.setattr(see_more, "ProcessPoolExecutor", lambda *_, **__: ThreadPoolExecutor(1))
+    words = f"see_more --size small --geodata {geodata} --city Neukölln --north known --out {out}"
+    lines = [see_more.TODAY, see_more.NAMES_READ]
+    monkeypatch.setattr(sys, "argv", [*words.split(), "--line", lines[0], "--line", lines[1]])
+    see_more.main()
+    rows = json.loads(out.read_text(encoding="utf-8"))
+    assert [row["line"] for row in rows] == lines
+    for row in rows:
+        assert 0 <= row["right"] <= row["answered"] <= row["queries"] == 5
+        assert row["near_low"] <= row["near"] <= row["near_high"]
+    assert rows[0]["objects"] <= rows[1]["objects"]
+    assert "Neukölln, the classes of before" in capsys.readouterr().out
+    see_more.main()
+    assert "within 50 m" not in capsys.readouterr().out
+    page = tables.page([], [], [], [], [], bayes=[], see_more=rows)
+    assert "| Neukölln | the classes of before |" in page
+    assert all(bar.what in page for _, bar in see_more.bars(rows))
 
 
 def test_the_upper_bound_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
