@@ -56,7 +56,7 @@ _MarkedPhoto = tuple[View, tuple[MarkNumber, ...], float]
 MIDDLE_FOV = POSSIBLE_FOV[len(POSSIBLE_FOV) // 2]
 STEP_ERROR = 0.2
 """Relative standard deviation of the length of a step without a stated error."""
-MOST_TOP, MOST_PHOTOS, MOST_MARKS = 100, 20, 200
+MOST_TOP, MOST_PHOTOS, MOST_MARKS, MOST_TEXT = 100, 20, 200, 200
 DEFAULT_TOP = 10  # of `semsig localize`
 BOX_LENGTH = 4
 MOST_PIXELS = 1_000_000
@@ -80,6 +80,7 @@ _Box = Annotated[
     tuple[_Pixel, _Pixel, _Pixel, _Pixel],
     Accepts(f"left, top, right and bottom of a box in pixels, up to {MOST_PIXELS:,}"),
 ]
+_Text = Annotated[str, length(0, MOST_TEXT), Accepts(f"text of up to {MOST_TEXT} letters")]
 LatLon = Annotated[
     tuple[_Lat, _Lon],
     Accepts("latitude and longitude in degrees, from -90 to 90 and from -360 to 360"),
@@ -87,9 +88,10 @@ LatLon = Annotated[
 
 
 class _Seen(FileTable, extra="ignore"):
-    """The class and the range of a marked object, which `parse_view` checks."""
+    """The class or family, the text and the range of a marked object; `parse_view` checks them."""
 
     kind: Annotated[Any, file_key("class")]
+    text: _Text | None = None
     range: Any = None
     range_error: Any = None
 
@@ -378,6 +380,7 @@ def _detections(
     columns = marks, offsets.tolist(), ranges.tolist(), errors.tolist()
     for mark, offset, metres, error in zip(*columns, strict=True):
         detection: dict[str, Any] = {"class": mark.kind, "offset": offset, "range": None}
+        detection["text"] = mark.text
         # The range of a mark overrides the one computed from its box.
         if mark.range is not None:
             detection |= {"range": mark.range, "range_error": mark.range_error}
@@ -435,7 +438,7 @@ def _leg(step: _Step) -> Leg:
 
 def _view_options(row: Mapping[str, Any]) -> dict[str, Any] | None:
     """Return a view as options of `semsig localize`, None if no options exist for it."""
-    if {"range_errors", "scores", "photos"} & row.keys():
+    if {"range_errors", "scores", "photos", "texts"} & row.keys():
         return None
     bearings = ",".join(f"{bearing:g}" for bearing in row["bearings"])
     options = {"types": row["types"], "bearings": bearings}

@@ -22,6 +22,8 @@ from semsig_gis.core import (
     SemsigError,
     UnknownNameError,
     class_signs,
+    codes_by_family,
+    family_named,
     nearest_name,
     place_links,
     read_table,
@@ -77,6 +79,7 @@ from semsig_gis.serve.question import (
     Question,
 )
 from semsig_gis.serve.reasons import class_shares, place_reasons
+from semsig_gis.sources import words_for
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -177,13 +180,28 @@ class Workbench:
             (item for item in self.taxonomy.classes if item.code in present),
             key=lambda item: -int(occurrences[item.code]),
         )
+        seen = [item.code for item in kinds if shares[item.code] > 0]
+        groups = codes_by_family(self.taxonomy, seen)
+        families = [
+            {
+                "name": name,
+                "heading": family_named(name).title,
+                "title": f"Any of {family_named(name).title.lower()}",
+                "words": words_for(name),
+                "colour": family_named(name).colour,
+                "ink": "#ffffff",
+                "pictogram": family_named(name).pictogram,
+            }
+            for name in groups
+            if len(groups) > 1
+        ]
         return {
             "name": self.city.path.stem,
             "fingerprint": self.city.digest,
             "cells": len(database),
             "crs": database.crs.to_string(),
             "radius": database.spec.radius,
-            "reach": database.reach,
+            "reach": database.near_reach,
             "method": "likelihood",
             "noise": list(self.noises),
             "licences": list(self.city.licenses),
@@ -199,6 +217,8 @@ class Workbench:
                     "symbol": item.symbol,
                     "name": item.name,
                     "title": item.title,
+                    "family": item.family,
+                    "words": words_for(item.name),
                     "colour": signs[item.code].colour,
                     "ink": signs[item.code].ink,
                     "drop": signs[item.code].drop,
@@ -210,6 +230,7 @@ class Workbench:
                 }
                 for item in kinds
             ],
+            "families": families,
             "signs": panel_signs(database),
             "verdicts": {
                 verdict: {"colour": VERDICTS[verdict], "text": text, **look}

@@ -1,11 +1,33 @@
-// The menu of classes at a mark: the frequent ones first, and a search by typing.
-semsig.kinds = ({city}) => [...city.classes.filter(({share}) => share > 0), semsig.unnamed];
+// What a mark may be: the classes of the city, the frequent ones first, any class of a family, or
+// something unnamed.
+semsig.kinds = ({city}) => [
+  ...city.classes.filter(({share}) => share > 0), ...city.families.filter(({name}) => name),
+  semsig.unnamed];
+// These in groups with a title: those that are seen most often, then by family.
+semsig.kindGroups = (session) => {
+  const {city: {families}} = session;
+  const kinds = semsig.kinds(session);
+  const classes = kinds.filter(({symbol}) => symbol && symbol !== "?");
+  if (!families.length) return [{title: "", items: kinds}];
+  return [
+    {title: "Seen most often", items: classes.slice(0, 8)},
+    ...families.map((family) => ({
+      title: family.heading,
+      items: [...(family.name ? [family] : []),
+        ...classes.filter((item) => item.family === family.name)]})),
+    {title: "", items: [semsig.unnamed]}];
+};
+// The kinds with a name or another word that matches, the best first.
+semsig.kindsLike = (session, text) => {
+  const kinds = semsig.kinds(session);
+  const names = kinds.map(({title, name, words = []}) =>
+    semsig.plain([title, name.replaceAll("_", " "), ...words].join("\n")));
+  return semsig.matches(names, semsig.plain(text), kinds.length).map(({at}) => kinds[at]);
+};
 // Asks for the class of a mark where it was clicked, or at the mark; a fresh mark and its class are
 // one step of undo. Typing a `letter` begins the search.
 semsig.askClass = (session, entry, event = null, fresh = false, letter = "") => {
   const [box, input, list] = ["classes", "class-search", "class-list"].map(semsig.element);
-  const kinds = semsig.kinds(session);
-  const names = kinds.map(({title, name}) => semsig.plain(`${title}\n${name.replaceAll("_", " ")}`));
   let offers = [];
   let at = 0;
   const close = () => {
@@ -23,19 +45,19 @@ semsig.askClass = (session, entry, event = null, fresh = false, letter = "") => 
   };
   const choose = (number) => {
     at = number;
-    [...list.children].forEach((item, index) => {
+    list.querySelectorAll(".offer").forEach((item, index) => {
       item.setAttribute("aria-selected", String(index === at && offers.length > 0));
       if (index === at) item.scrollIntoView({block: "nearest"});
     });
     input.setAttribute("aria-activedescendant", offers.length ? `class-${at}` : "");
   };
   const look = () => {
-    const words = semsig.plain(input.value);
-    offers = !words ? kinds : semsig.matches(names, words, kinds.length).map(
-      (match) => kinds[match.at]);
-    list.replaceChildren(...(offers.length ? offers : [null]).map((item, index) => {
-      const line = L.DomUtil.create("div", "offer");
-      line.id = `class-${index}`;
+    const groups = input.value ? [{title: "", items: semsig.kindsLike(session, input.value)}]
+      : semsig.kindGroups(session);
+    offers = groups.flatMap(({items}) => items);
+    const optionOf = (item) => {
+      const line = L.DomUtil.create("div", "offer", list);
+      line.id = `class-${list.querySelectorAll(".offer").length - 1}`;
       line.setAttribute("role", "option");
       if (item) {
         line.dataset.name = item.name;
@@ -43,8 +65,17 @@ semsig.askClass = (session, entry, event = null, fresh = false, letter = "") => 
       }
       semsig.text(line, "span", item?.title ?? "The city has no such class.");
       line.addEventListener("click", () => take(item));
-      return line;
-    }));
+    };
+    list.replaceChildren();
+    for (const {title, items} of groups) {
+      if (title) {
+        const heading = semsig.text(list, "div", title);
+        heading.className = "heading";
+        heading.setAttribute("role", "presentation");
+      }
+      items.forEach(optionOf);
+    }
+    if (!offers.length) optionOf(null);
     choose(0);
   };
   input.value = letter;

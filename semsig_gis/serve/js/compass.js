@@ -12,14 +12,27 @@ semsig.compass = (session, view) => {
     const angle = bearing * Math.PI / 180;
     return [out * Math.sin(angle), -out * Math.cos(angle)];
   };
-  const outOf = ({range}) => (
-    range === null ? rim + 8 : (rim - 8) * semsig.ranged(session, range, 0) / reach);
+  // Marks of unknown distance stand outside the rim, on three rings if they are many.
+  const rings = [rim + 8, rim + 21, rim + 34].map((out) => ({out, bearings: []}));
+  const ringOf = new Map();
+  for (const entry of view.compass.filter(({range}) => range === null)) {
+    const space = ({out, bearings}) => Math.min(999, ...bearings.map(
+      (other) => Math.abs((other - entry.bearing + 540) % 360 - 180) * out));
+    const free = rings.find((ring) => space(ring) > 900)
+      || rings.reduce((best, ring) => (space(ring) > space(best) ? ring : best));
+    free.bearings.push(entry.bearing);
+    ringOf.set(entry, free.out);
+  }
+  const outOf = (entry) => ringOf.get(entry)
+    ?? (rim - 8) * semsig.share(semsig.ranged(session, entry.range, 0), reach);
   for (const [from, to] of view.sectors || []) {
     const [[x, y], [endX, endY]] = [turned(from, rim), turned(to, rim)];
     const large = (to - from + 360) % 360 > 180 ? 1 : 0;
     draw("path", {d: `M0,0L${x},${y}A${rim},${rim} 0 ${large} 1 ${endX},${endY}Z`, class: "looked"});
   }
-  for (const share of [1 / 3, 2 / 3, 1]) draw("circle", {r: (rim - 8) * share, class: "third"});
+  for (const share of [1 / 3, 2 / 3, 1]) {
+    draw("circle", {r: (rim - 8) * semsig.share(reach * share, reach), class: "third"});
+  }
   draw("circle", {r: rim, class: "ring"});
   draw("circle", {r: 2, class: "north"});
   const unknown = view.heading_error !== null;
@@ -38,7 +51,7 @@ semsig.compass = (session, view) => {
     const x = (event.clientX - edge.left) / edge.width * 240 - 120;
     const y = (event.clientY - edge.top) / edge.height * 240 - 120;
     const out = Math.hypot(x, y);
-    const range = Math.min(Math.max(out / (rim - 8), 1 / reach), 1) * reach;
+    const range = Math.max(semsig.metresAt(Math.min(out / (rim - 8), 1), reach), 1);
     return {
       bearing: Math.round((Math.atan2(x, -y) * 180 / Math.PI + 360) % 360) % 360,
       range: out > rim ? null : Math.round(range),

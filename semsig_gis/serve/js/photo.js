@@ -7,20 +7,23 @@ semsig.sign = (item) => {
 };
 // The class of marks without a name.
 semsig.unnamed = {...semsig.anySign, name: "?", symbol: "?", title: "Something unnamed"};
-semsig.classNamed = (session, name) =>
-  session.city.classes.find((item) => item.name === name) || semsig.unnamed;
+semsig.classNamed = ({city}, name) =>
+  [...city.classes, ...city.families].find((item) => item.name === name) || semsig.unnamed;
+// What a mark is, what is written on it, and how far it is.
+semsig.described = (session, {class: name, range, text}) => [
+  semsig.classNamed(session, name).title, text && `\u201c${text}\u201d`, semsig.metres(range)]
+  .filter(Boolean).join(", ");
 // A range as text: it is in metres, or near, middle or far; null if it is unknown.
 semsig.metres = (range) => (
   typeof range === "number" ? `${Math.round(range)} m` : range === "middle" ? "midway" : range ?? "");
 // The button of a mark, which is moved by dragging (`drag`) or by arrow keys (`nudge`).
 semsig.mark = (session, entry, {drag, nudge}) => {
-  const {title} = semsig.classNamed(session, entry.class);
   const button = L.DomUtil.create("button", "mark");
   button.type = "button";
   button.append(semsig.sign(semsig.classNamed(session, entry.class)));
   semsig.text(button, "span", semsig.metres(entry.range));
   button.setAttribute("aria-pressed", String(session.mark === entry));
-  button.setAttribute("aria-label", [title, semsig.metres(entry.range)].filter(Boolean).join(", "));
+  button.setAttribute("aria-label", semsig.described(session, entry));
   button.addEventListener("pointerdown", (event) => {
     event.stopPropagation();
     event.preventDefault();

@@ -28,12 +28,17 @@ semsig.button = (parent, text, call, label) => {
   button.addEventListener("click", call);
   return button;
 };
-// A class for the next marks, instead of a menu at each.
+// A class for the next marks, instead of a menu at each; of many classes, by family and by search.
 semsig.palette = (session) => {
-  const box = semsig.element("palette");
+  const [box, search] = ["palette", "palette-search"].map(semsig.element);
   const ask = {name: "", title: "Ask at each mark"};
-  box.replaceChildren(...[ask, ...semsig.kinds(session)].map((item) => {
-    const button = L.DomUtil.create("button", "class");
+  const chosen = () => {
+    for (const button of box.querySelectorAll("button")) {
+      button.setAttribute("aria-pressed", String(button.dataset.name === (session.brush ?? "")));
+    }
+  };
+  const add = (parent, items) => items.forEach((item) => {
+    const button = L.DomUtil.create("button", "class", parent);
     button.type = "button";
     if (item.name) button.append(semsig.sign(item));
     semsig.text(button, "span", item.title);
@@ -42,15 +47,29 @@ semsig.palette = (session) => {
       session.brush = item.name || null;
       session.notify("change");
     });
-    return button;
-  }));
-  const chosen = () => {
-    for (const button of box.children) {
-      button.setAttribute("aria-pressed", String(button.dataset.name === (session.brush ?? "")));
+  });
+  const show = () => {
+    box.replaceChildren();
+    add(box, [ask]);
+    if (search.value) add(box, semsig.kindsLike(session, search.value));
+    else {
+      semsig.kindGroups(session).forEach(({title, items}, at) => {
+        if (!title) {
+          add(box, items);
+          return;
+        }
+        const part = L.DomUtil.create("details", "", box);
+        part.open = at === 0;
+        semsig.text(part, "summary", title);
+        add(part, items);
+      });
     }
+    chosen();
   };
+  search.hidden = !session.city.families.length;
+  search.addEventListener("input", show);
   session.addEventListener("change", chosen);
-  chosen();
+  show();
 };
 semsig.showScenes = (session) => {
   const box = semsig.element("scenes");
@@ -136,11 +155,10 @@ semsig.showScene = (session) => {
 semsig.showMarks = (session) => {
   const line = semsig.element("marks");
   line.replaceChildren(...session.entries.map((entry) => {
-    const {title} = semsig.classNamed(session, entry.class);
     const button = L.DomUtil.create("button", "");
     button.type = "button";
     button.append(semsig.sign(semsig.classNamed(session, entry.class)));
-    semsig.text(button, "span", [title, semsig.metres(entry.range)].filter(Boolean).join(", "));
+    semsig.text(button, "span", semsig.described(session, entry));
     button.setAttribute("aria-pressed", String(entry === session.mark));
     button.addEventListener("click", () => session.show(
       session.scene, entry === session.mark ? null : entry));
@@ -150,7 +168,7 @@ semsig.showMarks = (session) => {
   semsig.button(line, "+ Mark in the middle", () => semsig.addMark(
     session, scene.marks ? {x: scene.width / 2, y: scene.height / 2} : {bearing: 0})).id = "add-mark";
 };
-// The selected mark: its class and its distance.
+// The selected mark: its class, what is written on it, and its distance.
 semsig.showEditor = (session) => {
   const box = semsig.element("editor");
   const {mark, city: {reach}} = session;
@@ -166,6 +184,13 @@ semsig.showEditor = (session) => {
     mark.class = value;
     session.changed();
   }).id = "class";
+  const text = L.DomUtil.create("input", "", label("Reads"));
+  Object.assign(text, {type: "text", id: "text", value: mark.text ?? "", maxLength: 200,
+    placeholder: "name, sign or number", autocomplete: "off", spellcheck: false});
+  text.addEventListener("change", () => {
+    mark.text = text.value.trim() || null;
+    session.changed();
+  });
   const choices = {
     "": mark.box ? "from its box" : "unknown", near: `near, up to ${Math.round(reach / 3)} m`,
     middle: "midway", far: `far, up to ${Math.round(reach)} m`};
