@@ -155,6 +155,7 @@ from .tables import Table as Table
 from .tables import figure as figure
 from .tables import interval as interval
 from .tables import markdown_rows as markdown_rows
+from .taxonomy import LETTERS as LETTERS
 from .taxonomy import MAX_CODE as MAX_CODE
 from .taxonomy import MAX_HEIGHT_M as MAX_HEIGHT_M
 from .taxonomy import MAX_RANGE_M as MAX_RANGE_M

@@ -17,7 +17,13 @@ from typing_extensions import TypedDict
 from semsig_gis.core import SOURCE, SOURCE_ID, WILDCARD, Displayed, signed_degrees, wrap_degrees
 from semsig_gis.database import visible_objects_at, visible_objects_in
 from semsig_gis.localization.likelihood.association import Detections, associate, near_pairs
-from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables, query_bearings
+from semsig_gis.localization.likelihood.texts import best_text
+from semsig_gis.localization.noise.table import (
+    LONGEST_TABLE,
+    DividedTaxonomy,
+    noise_tables,
+    query_bearings,
+)
 from semsig_gis.observation import GRID_NORTH, Photo, View
 
 if TYPE_CHECKING:
@@ -66,6 +72,8 @@ class ExplanationRow(TypedDict):
     object_bearing: float | None
     distance: float | None
     bearing_error: float | None
+    query_text: NotRequired[str | None]
+    object_text: NotRequired[str | None]
 
 
 class HeadingsRecord(TypedDict):
@@ -85,7 +93,9 @@ class ExplanationRecord(HeadingsRecord):
     rows: list[ExplanationRow]
 
 
-COLUMNS = [*ExplanationRow.__annotations__]
+TEXT_COLUMNS = ["query_text", "object_text"]
+"""Columns of an explanation of a view with texts."""
+COLUMNS = [name for name in ExplanationRow.__annotations__ if name not in TEXT_COLUMNS]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -98,9 +108,10 @@ class Explanation(Displayed):
     ``"false"``, ``"missed"`` or, for street objects in the sectors of no photo, ``"outside"``;
     `chance` is the probability of the verdict. `query`, `photo` and `object` are row numbers,
     `distance` and `query_range`, if given, are in metres, `bearing_error` is in degrees clockwise
-    from object to detection, and `place` that of the street object. Values that do not apply are
-    None. `place` and `xy` are in metres in `crs`, `headings` are the degrees added to the bearings
-    of each photo.
+    from object to detection, and `place` that of the street object. If texts were read, they are
+    the `query_text`, and `object_text` is that of the map. Values that do not apply are None.
+    `place` and `xy` are in metres in `crs`, `headings` are the degrees added to the bearings of
+    each photo.
     """
 
     rows: tuple[dict[str, Any], ...]
@@ -130,8 +141,27 @@ class Explanation(Displayed):
 
         places = [row["place"] for row in self.rows]
         points = [None if place is None else shapely.Point(place) for place in places]
-        table = pd.DataFrame(self.rows, columns=COLUMNS).astype(dict.fromkeys(ROW_NUMBERS, "Int64"))
+        table = pd.DataFrame(self.rows, columns=self.columns).astype(
+            dict.fromkeys(ROW_NUMBERS, "Int64")
+        )
         return gpd.GeoDataFrame(table, geometry=points, crs=self.crs)
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of the columns, with those of texts if some were read."""
+        read = any(row.get("query_text") for row in self.rows)
+        return [*COLUMNS, *(TEXT_COLUMNS if read else ())]
+
+    def numbered(self, rows: NDArray[np.int64]) -> Explanation:
+        """Return the explanation of some rows of a query, with their numbers there."""
+        numbers: list[Any] = rows.tolist()
+        return replace(
+            self,
+            rows=tuple(
+                row if row["query"] is None else {**row, "query": numbers[row["query"]]}
+                for row in self.rows
+            ),
+        )
 
     def ends(self, reach: float) -> NDArray[np.float64]:
         """Return the end of the line to each row, shape (n, 2): at its range, or at `reach`.
@@ -159,7 +189,8 @@ class Explanation(Displayed):
 
         Bearings count from `north`, not from grid north as in the table.
         """
-        rows: list[Any] = [{name: row[name] for name in COLUMNS} for row in self.rows]
+        names = self.columns
+        rows: list[Any] = [{name: row[name] for name in names} for row in self.rows]
         for row in rows:
             for name in ("query_bearing", "object_bearing"):
                 row[name] = None if row[name] is None else north.from_grid(row[name])
@@ -187,6 +218,7 @@ def explain(
     radius: float = 30.0,
     heading: float | Sequence[float] = 0.0,
     footprints: Footprints | None = None,
+    said: Signature | None = None,
 ) -> Explanation:
     """Explain which objects of a query are which street objects, if it was seen from a place.
 
@@ -201,7 +233,7 @@ def explain(
     view = visible_objects_at(objects, place, index=index, radius=radius, footprints=footprints)
     codes = np.flatnonzero(np.bincount(objects.codes)).astype(np.uint8)
     scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, radius, objects)
-    return scene.explanation(query, noise, heading)
+    return scene.explanation(query, noise, heading, query if said is None else said)
 
 
 def explain_cell(
@@ -211,6 +243,7 @@ def explain_cell(
     *,
     database: SignatureDatabase,
     heading: float | Sequence[float] = 0.0,
+    said: Signature | None = None,
 ) -> Explanation:
     """Explain which objects of a query are which objects of a cell, using only the database.
 
@@ -222,7 +255,7 @@ def explain_cell(
     view = visible_objects_in(database, np.array([cell]))
     codes, radius = database.present_codes, database.spec.radius
     scene = _Scene((x, y), view, codes, database.taxonomy, database.crs, radius)
-    return scene.explanation(query, noise, heading)
+    return scene.explanation(query, noise, heading, query if said is None else said)
 
 
 OBJECT_FIELDS = ("objects", "codes", "bearings", "distances")
@@ -251,9 +284,13 @@ class _Scene:
     objects: StreetObjects | None = None
 
     def explanation(
-        self, query: Signature, noise: Noise, heading: float | Sequence[float]
+        self,
+        query: Signature,
+        noise: Noise,
+        heading: float | Sequence[float],
+        said: Signature,
     ) -> Explanation:
-        """Return the verdicts on the objects of a query and of the scene."""
+        """Return the verdicts on the objects of a query, `said` to be so, and of the scene."""
         view = View.of(query)
         turns = np.broadcast_to(heading, len(view.photos)).astype(np.float64)
         # `replace` keeps the order of the objects, which is that of the rows of the query.
@@ -268,7 +305,7 @@ class _Scene:
             own = np.flatnonzero(view.photo_rows == number)
             places = _partners(pairs.chances[:, own])
             partners |= {int(own[place]): entry for place, entry in places.items()}
-        rows = self._detection_rows(view, pairs.chances, partners)
+        rows = self._detection_rows(view, pairs.chances, partners, View.of(said))
         for entry, (missed, inside) in enumerate(
             zip(pairs.missed.tolist(), pairs.inside.tolist(), strict=True)
         ):
@@ -277,7 +314,7 @@ class _Scene:
                 verdict = "missed" if is_inside else OUTSIDE
                 chance = missed if is_inside else 1.0 - inside
                 rows.append({"verdict": verdict, "chance": chance, **self._object(entry)})
-        blank = dict.fromkeys([*COLUMNS, "place"])
+        blank = dict.fromkeys([*COLUMNS, *TEXT_COLUMNS, "place"])
         return Explanation(
             rows=tuple(blank | row for row in rows),
             xy=self.xy,
@@ -325,11 +362,18 @@ class _Scene:
         return _Chances(chances, np.maximum(missed, 0.0), inside.max(axis=0), total)
 
     def _detection_rows(
-        self, query: View, chances: NDArray[np.float64], partners: dict[int, int]
+        self,
+        query: View,
+        chances: NDArray[np.float64],
+        partners: dict[int, int],
+        said: View,
     ) -> list[dict[str, Any]]:
         """Return a row for each object of the query of a known class."""
         bearings = query_bearings(query)
-        scores, names = query.class_scores(), query.class_names(self.taxonomy)
+        taxonomy = self.taxonomy
+        if isinstance(taxonomy, DividedTaxonomy):
+            taxonomy = taxonomy.whole
+        scores, names = said.class_scores(), said.class_names(taxonomy)
         likeliest = scores == scores.max(axis=1, keepdims=True)
         ranges = np.full(len(query), np.nan) if query.ranges is None else query.ranges
         rows = []
@@ -343,26 +387,28 @@ class _Scene:
                 "query_class": names[number],
                 "query_bearing": float(bearings[number]),
                 "query_range": None if math.isnan(metres) else metres,
+                "query_text": query.text_rows[number] or None,
             }
             if number in partners:
                 entry = partners[number]
-                same = likeliest[number, [WILDCARD, self.view.codes[entry]]].any()
+                code = self._code(int(self.view.codes[entry]))
+                same = likeliest[number, [WILDCARD, code]].any()
                 away = signed_degrees(bearings[number] - self.view.bearings[entry])
                 row |= {
                     "verdict": "matched" if same else "misnamed",
                     "chance": float(chances[entry, number]),
                     "bearing_error": float(away),
-                    **self._object(entry),
+                    **self._object(entry, query.text_rows[number]),
                 }
             rows.append(row)
         return rows
 
-    def _object(self, entry: int) -> dict[str, Any]:
-        """Return the columns of a street object."""
+    def _object(self, entry: int, text: str = "") -> dict[str, Any]:
+        """Return the columns of a street object, with its text that is most like another one."""
         view = self.view
         bearing, distance = float(view.bearings[entry]), float(view.distances[entry])
         facts: dict[str, Any] = {
-            "object_class": self.taxonomy.by_code(int(view.codes[entry])).name,
+            "object_class": self.taxonomy.by_code(self._code(int(view.codes[entry]))).name,
             "object_bearing": bearing,
             "distance": distance,
         }
@@ -377,8 +423,14 @@ class _Scene:
             "object": row,
             "source": str(table[SOURCE].iloc[row]),
             "source_id": str(table[SOURCE_ID].iloc[row]),
+            "object_text": best_text(self.objects, row, text),
             "place": tuple(self.objects.xy[row].tolist()),
         }
+
+    def _code(self, code: int) -> int:
+        """Return the class code of an object, that of the whole class of a part."""
+        taxonomy = self.taxonomy
+        return taxonomy.whole_code(code) if isinstance(taxonomy, DividedTaxonomy) else code
 
 
 def _partners(chances: NDArray[np.float64]) -> dict[int, int]:

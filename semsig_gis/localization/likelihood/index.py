@@ -13,7 +13,7 @@ import json
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -158,6 +158,11 @@ class LikelihoodIndex(Displayed):
         bin_of = (np.arange(BEARING_UNITS) * BINS // BEARING_UNITS).astype(np.uint16)
         bins = bin_of[database.bearing_units]
         return self.levels.objects(database.offsets, database.codes, bins, database.distance_units)
+
+    @cached_property
+    def memo(self) -> dict[Any, Any]:
+        """What is computed from the index for some questions, and kept with it."""
+        return {}
 
     def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
         """Return the log-likelihood of a view in every cell, and the likeliest turns of its photos.

@@ -16,7 +16,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
-from semsig_gis.core import FULL_TURN, InputError, cell_ids, export_with, map_with, percent
+from semsig_gis.core import (
+    DatabaseError,
+    InputError,
+    cell_ids,
+    export_with,
+    map_with,
+    percent,
+)
+from semsig_gis.database import City
 from semsig_gis.localization.answers import (
     LEAST_ELSEWHERE,
     REGION_SHARE,
@@ -48,6 +56,7 @@ from semsig_gis.localization.likelihood.posterior import (
     prior_ratio,
     refine,
 )
+from semsig_gis.localization.likelihood.reading import KEPT, has_texts, read_view
 from semsig_gis.localization.likelihood.route import route_posteriors
 from semsig_gis.localization.noise.model import cell_noise, place_noise
 from semsig_gis.observation import GRID_NORTH, View
@@ -60,7 +69,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import MapFrame, Signature
-    from semsig_gis.database import City, ObjectStore, SignatureDatabase
+    from semsig_gis.database import ObjectStore, SignatureDatabase
     from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.likelihood.answer_rule import AnswerRule, Decision
     from semsig_gis.localization.likelihood.estimate import PlaceEstimate
@@ -69,6 +78,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.location_record import LocationRecord
     from semsig_gis.localization.likelihood.posterior import Places, Posterior, Refinement
+    from semsig_gis.localization.likelihood.reading import Reading, TextRecord
     from semsig_gis.observation import Leg, North
 
 DISAGREEMENT = 0.01
@@ -139,6 +149,8 @@ class Location(Answer):
         Chance of each version of the query (see `locate_versions`); `query` is the likeliest.
     unplaced, absent : tuple of int
         Class codes of objects that were seen without a direction, or looked for and not seen.
+    texts : tuple of dict
+        For each text that was read, the names of the map that it fits best (see `to_dict`).
 
     Examples
     --------
@@ -165,6 +177,7 @@ class Location(Answer):
     versions: tuple[float, ...] = (1.0,)
     unplaced: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
+    texts: tuple[TextRecord, ...] = ()
 
     def _facts(self) -> dict[str, object]:
         sure = self.answer.given
@@ -338,6 +351,9 @@ class Location(Answer):
         100. ``doubt`` may be empty; ``doubt_parts`` are the numbers in it (see `DoubtRecord`).
         ``candidates`` have the keys of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, for the
         first of them, ``explanation``, with bearings from ``north`` like those of the query.
+        ``texts``, if something was read, has for each ``text`` the best ``fit`` ("exact", "part",
+        "letters off" or "none"), its ``kind`` ("object" or "street"), some of the ``names`` that
+        fit so and the ``count`` of all that do.
         ``prior`` has the keys of `known` and ``ratio``; it is None without a prior.
         """
         lat, lon = self.latlon
@@ -346,7 +362,7 @@ class Location(Answer):
             candidate["explanation"] = why.to_dict(self.north)
         threshold, ratio = self.rule.threshold, self.prior_ratio
         prior: Any = None if ratio is None else {**self.known, "ratio": ratio}
-        return {
+        values: LocationRecord = {
             "query": self.query.to_dict(self.taxonomy),
             "north": self.north.to_dict(),
             "noise": self.noise,
@@ -381,6 +397,9 @@ class Location(Answer):
             "licenses": list(self.licenses),
             "candidates": candidates,
         }
+        if self.texts:
+            values["texts"] = list(self.texts)
+        return values
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -530,22 +549,35 @@ class LikelihoodLocator:
             )
 
     def _usable_objects(self, query: Signature) -> Signature:
-        """Return a query with bearings from grid north, without classes that no cell sees.
+        """Return a query with bearings from grid north, without classes that no cell sees."""
+        reading = self._reading(query)
+        return reading.view if reading.said is None else reading.said
 
-        Objects that may be of several classes, without bearings, are in any direction.
-        """
-        query = self.north.to_grid(query)
-        usable = query.among(self.index.database.present_codes)
-        query = query if usable.all() else query.select(usable)
-        if query.bearings is None and isinstance(query, View) and query.scores is not None:
-            anywhere = np.zeros(len(query)), np.full(len(query), FULL_TURN / 2.0)
-            return replace(query, bearings=anywhere[0], bearing_errors=anywhere[1])
-        return query
+    def _reading(self, query: Signature) -> Reading:
+        """Return what is read in a query; the index keeps the last ones."""
+        view = self.north.to_grid(query)
+        if not has_texts(view):
+            return read_view(view, self.index, None)
+        store = _text_store(self.store, self.city)
+        memo: dict[Any, Reading] = self.index.memo
+        key = query, store, self.north
+        reading = memo.get(key)
+        if reading is None:
+            memo[key] = reading = read_view(view, self.index, store)
+            for old in list(memo)[:-KEPT]:
+                memo.pop(old, None)
+        return reading
 
     def scan(self, query: Signature) -> CellScores:
-        """Return the scores of all cells by the sum over detections one by one."""
-        index = self.incremental or self.index
-        return index.scores(self._usable_objects(query), north_sigma=self.north_sigma)
+        """Return the scores of all cells by the sum over detections one by one.
+
+        What was read in an unknown direction is not among them.
+        """
+        reading = self._reading(query)
+        index = reading.index
+        if self.incremental is not None and index is self.index:
+            return self.incremental.scores(reading.view, north_sigma=self.north_sigma)
+        return index.scores(reading.view, north_sigma=self.north_sigma)
 
     def scores(
         self,
@@ -555,15 +587,21 @@ class LikelihoodLocator:
         scanned: CellScores | None = None,
     ) -> CellScores:
         """Return the scores of all cells; those of the best are by one-to-one associations."""
-        return rerank(
-            self.index,
-            self._usable_objects(query),
+        reading = self._reading(query)
+        if reading.extra is not None:
+            log_prior = reading.extra if log_prior is None else log_prior + reading.extra
+        scores = rerank(
+            reading.index,
+            reading.view,
             scanned or self.scan(query),
             north_sigma=self.north_sigma,
             log_prior=log_prior,
             off_centre=not self.quick,
             sample=QUICK_SAMPLE if self.quick else SAMPLE,
         )
+        if reading.extra is None:
+            return scores
+        return replace(scores, loglik=scores.loglik + reading.extra)
 
     def _store_for(self, queries: Sequence[Signature]) -> ObjectStore | None:
         """Return the street objects if places are to be refined, else None."""
@@ -595,7 +633,7 @@ class LikelihoodLocator:
             query, scores, posterior = versions[number]
             usable = self._usable_objects(query)
             if store is not None and len(usable) and shares[number] >= LEAST_REFINED:
-                parts = self.parts(usable, scores, posterior, store)
+                parts = self.parts(query, scores, posterior, store)
                 scores, posterior = _with_parts(parts, scores, posterior)
             chances += shares[number] * posterior.chances
         if len(versions) > 1:
@@ -619,7 +657,7 @@ class LikelihoodLocator:
                 north_sigma=sigma,
                 turned=not self.quick,
             )
-        columns = _columns(scores, posterior, places)
+        columns, reading = _columns(scores, posterior, places), self._reading(query)
         first = columns["cell"].tolist()[: self.explained if len(usable) else 0]
         (best,) = posterior.likeliest(1).tolist()
         fit = goodness_of_fit(self.index, usable, best, scores.headings_at(best))
@@ -633,6 +671,7 @@ class LikelihoodLocator:
             licenses=answer_licenses(database, city),
             notes=(
                 *query_notes(query, database.present_codes, database.taxonomy),
+                *reading.notes,
                 *_prior_notes(ratio),
                 *self.north.notes,
             ),
@@ -651,6 +690,7 @@ class LikelihoodLocator:
             versions=tuple(shares.tolist()),
             unplaced=self.unplaced,
             absent=self.absent,
+            texts=reading.records,
         )
         return location.doubted(elsewhere, fit)
 
@@ -661,47 +701,62 @@ class LikelihoodLocator:
         database, chances = posterior.database, posterior.chances
         cells = posterior.likeliest(DIVIDED_PARTS[0])
         cells = cells[chances[cells] > 0]
-        return refine(
-            query,
+        reading, extra = self._reading(query), np.zeros(len(cells))
+        if reading.extra is not None:
+            extra = reading.extra[cells]
+        parts = refine(
+            reading.view,
             database.xy[cells],
             place_noise(self.index.noise, database.grid.step),
-            store=store,
+            store=store if reading.store is None else reading.store,
             step=database.grid.step,
             radius=database.spec.radius,
             north_sigma=self.north_sigma,
             headings=[None if turns is None else turns[cells] for turns in scores.headings],
-            # The chances of the cells without the likelihood of this query.
-            log_prior=np.log(chances[cells]) - scores.loglik[cells],
+            # The chances of the cells without the likelihood of the objects of this query.
+            log_prior=np.log(chances[cells]) - scores.loglik[cells] + extra,
             occlusion=database.occlusion,
         )
+        if reading.extra is None:
+            return parts
+        return replace(parts, loglik=parts.loglik + reading.extra[_owners(parts, database)])
 
     def _explanation(
         self, query: Signature, cell: int, scores: CellScores, parts: Refinement | None
     ) -> Explanation:
         """Explain a query at a cell: at its likeliest part, or at its centre."""
-        query = self.north.to_grid(query)
+        reading, store = self._reading(query), self.store
         database, noise = self.index.database, self.index.noise
+        divided = reading.said is not None
+        view = reading.view if divided else self.north.to_grid(query)
         headings = scores.headings_at(cell)
-        if self.store is None:
-            return explain_cell(query, cell, noise, database=database, heading=headings)
+        if store is None:
+            database = reading.index.database
+            explanation = explain_cell(
+                view, cell, noise, database=database, heading=headings, said=reading.said
+            )
+            return explanation.numbered(reading.rows) if divided else explanation
         x, y = database.xy[cell].tolist()
         if parts is not None and len(inside := np.flatnonzero(_owners(parts, database) == cell)):
             best = inside[parts.loglik[inside].argmax()]
             x, y = parts.places[best].tolist()
             headings[0] = float(parts.headings[best])
             noise = cell_noise(place_noise(noise, database.grid.step), float(parts.sizes[best]))
-        return explain(
-            query,
+        store = reading.store or store
+        explanation = explain(
+            view,
             (x, y),
             noise,
-            objects=self.store.objects,
-            index=self.store.index,
+            objects=store.objects,
+            index=store.index,
             radius=database.spec.radius,
             heading=headings,
-            footprints=self.store.buildings_around(
+            said=reading.said,
+            footprints=store.buildings_around(
                 np.array([[x, y]]), distance=database.near_reach, occlusion=database.occlusion
             ),
         )
+        return explanation.numbered(reading.rows) if divided else explanation
 
 
 class LikelihoodOptions(TypedDict, total=False):
@@ -940,6 +995,16 @@ def _with_parts(
         heading[owners[order]] = parts.headings[order]
     parted = CellScores(loglik=loglik, headings=(heading, *scores.headings[1:]))
     return parted, replace(before, chances=chances)
+
+
+def _text_store(store: ObjectStore | None, city: City | ObjectStore | None) -> ObjectStore | None:
+    """Return the street objects that texts are compared with, None if there are none."""
+    if store is not None:
+        return store
+    try:
+        return city.store if isinstance(city, City) else city
+    except DatabaseError:
+        return None
 
 
 def _owners(parts: Refinement, database: SignatureDatabase) -> NDArray[np.int64]:

@@ -15,6 +15,7 @@ from semsig_gis.localization.answers import (
 )
 from semsig_gis.localization.likelihood.estimate import EstimateRecord
 from semsig_gis.localization.likelihood.explain import ExplanationRecord  # noqa: TC001 - pydantic reads it
+from semsig_gis.localization.likelihood.reading import TextRecord  # noqa: TC001 - pydantic reads it
 
 
 class PlaceRecord(EstimateRecord, BestPlaceRecord):
@@ -82,3 +83,4 @@ class LocationRecord(AnswerRecord):
     entropy_bits: float
     prior: PriorRecord | None
     candidates: list[LikelyRecord]
+    texts: NotRequired[list[TextRecord]]

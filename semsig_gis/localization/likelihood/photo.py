@@ -84,19 +84,7 @@ class PhotoTable:
         ranges = unknown if photo.ranges is None else photo.ranges
         ranged = ~np.isnan(ranges)
         disc = np.where(ranged, 2.0 * (np.where(ranged, ranges, 1.0) / table.scale.reach) ** 2, 1.0)
-        if photo.scores is None:
-            codes = np.zeros(size, np.uint8) if photo.codes is None else photo.codes
-            table.class_rows(codes)  # raises for unknown classes
-            scores = (table.codes[:, None] == codes) | (codes == WILDCARD)
-        else:
-            any_class = photo.scores[:, WILDCARD]
-            shared = np.where(any_class < 1.0, any_class / len(table.codes), 1.0)
-            scores = photo.scores[:, table.codes].T + shared
-            # Classes that no cell sees cannot be meant: the others share their chance.
-            absent = np.delete(photo.scores, [WILDCARD, *table.codes], axis=1).sum(axis=1)
-            nowhere = np.flatnonzero(scores.sum(axis=0) == 0.0)
-            table.class_rows(photo.scores[nowhere].argmax(axis=1).astype(np.uint8))  # raises
-            scores[:, absent > 0.0] /= scores.sum(axis=0)[absent > 0.0]
+        scores = name_scores(photo, table)
         errors = unknown if photo.range_errors is None else photo.range_errors
         rough = np.zeros(size) if photo.bearing_errors is None else photo.bearing_errors
         (look,) = photo.photos
@@ -105,7 +93,7 @@ class PhotoTable:
             bearing_errors=np.nan_to_num(rough),
             ranges=ranges,
             range_errors=errors,
-            scores=scores.astype(np.float64),
+            scores=scores,
             disc=disc,
             sectors=np.array(look.sectors, dtype=np.float64).reshape(-1, 2),
             width=look.width / FULL_TURN,
@@ -138,6 +126,26 @@ class PhotoTable:
         """Return the chance of the scores of each detection, by length and class, (l, k, n)."""
         wrong = table.misnamed[:, :, None]
         return np.asarray((1.0 - wrong) * self.scores + wrong * (table.others @ self.scores))
+
+
+def name_scores(photo: View, table: NoiseTable) -> NDArray[np.float64]:
+    """Return the scores of the classes of a table for each detection, shape (k, n).
+
+    InputError if a class is not in the table.
+    """
+    if photo.scores is None:
+        codes = np.zeros(len(photo), np.uint8) if photo.codes is None else photo.codes
+        table.class_rows(codes)  # raises for unknown classes
+        return np.asarray((table.codes[:, None] == codes) | (codes == WILDCARD), dtype=np.float64)
+    any_class = photo.scores[:, WILDCARD]
+    shared = np.where(any_class < 1.0, any_class / len(table.codes), 1.0)
+    scores = np.asarray(photo.scores[:, table.codes].T + shared)
+    # Classes that no cell sees cannot be meant: the others share their chance.
+    absent = np.delete(photo.scores, [WILDCARD, *table.codes], axis=1).sum(axis=1)
+    nowhere = np.flatnonzero(scores.sum(axis=0) == 0.0)
+    table.class_rows(photo.scores[nowhere].argmax(axis=1).astype(np.uint8))  # raises
+    scores[:, absent > 0.0] /= scores.sum(axis=0)[absent > 0.0]
+    return scores
 
 
 def photo_loglik(

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import DISTANCE_UNITS, WILDCARD, DistanceScale, InputError
+from semsig_gis.core import DISTANCE_UNITS, WILDCARD, DistanceScale, InputError, Taxonomy
 from semsig_gis.localization.noise.families import noise_by_class
 from semsig_gis.localization.noise.model import ALL, BY_CLASS
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core import Signature, Taxonomy
+    from semsig_gis.core import Signature
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.noise.model import Noise, NoiseSpec
 
@@ -32,6 +32,23 @@ FULL_TURN = 360.0
 WIDEST_SIGMA = 180.0
 FAMILY_SHARE = 0.7  # of the misnamed objects, that are given another class of their family
 LONGEST_TABLE = 400  # longest signature with its own chances; longer ones use the same
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
+class DividedTaxonomy(Taxonomy):
+    """The classes of a `whole` taxonomy, some of them divided by what is written on their objects.
+
+    `parents` are the codes of the classes that parts of them have been taken from, by the code of
+    the part. The code `rest` is that of false objects only: the detections that no text fits.
+    """
+
+    whole: Taxonomy
+    parents: Mapping[int, int]
+    rest: int
+
+    def whole_code(self, code: int) -> int:
+        """Return the code of the class of an object or a part of a class."""
+        return self.parents.get(code, code)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -121,6 +138,31 @@ class NoiseTable:
         turned = np.degrees(self.position_sigma / self.distances)
         return np.asarray(np.minimum(np.hypot(self.sigma[:, None], turned), WIDEST_SIGMA))
 
+    def divided(self, taxonomy: DividedTaxonomy) -> NoiseTable:
+        """Return the table with a row for each part of a class, equal to that of the class.
+
+        Nothing is named by a part: the texts of a view are in its scores. Half of the false objects
+        are those of the code `rest`.
+        """
+        rows = [int(self.row_of[code]) for code in taxonomy.parents.values()]
+        kinds = np.array([*range(len(self.codes)), *rows, 0])
+        others = np.zeros((len(kinds), len(kinds)))
+        others[:, : len(self.codes)] = self.others[kinds]
+        halves = np.append(self.clutter, np.zeros(len(rows) + 1)) / 2.0
+        halves[-1] = self.clutter.sum() / 2.0
+        return replace(
+            self,
+            codes=np.array([*self.codes.tolist(), *taxonomy.parents, taxonomy.rest], np.uint8),
+            missed=self.missed[:, kinds],
+            misnamed=self.misnamed[:, kinds],
+            others=others,
+            clutter=halves,
+            sigma=self.sigma[kinds],
+            range_sigma=self.range_sigma[kinds],
+            ranges=self.ranges[kinds],
+            fading=self.fading[kinds],
+        )
+
     def length_rows(self, lengths: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the row of each signature length, the last one for longer signatures."""
         return np.minimum(lengths, len(self.missed) - 1)
@@ -176,6 +218,17 @@ def noise_tables(
     `InputError` if the model has a class that the taxonomy does not have, or gives a class no
     chance of any name in `codes`.
     """
+    if isinstance(taxonomy, DividedTaxonomy):
+        parts = [*taxonomy.parents, taxonomy.rest]
+        present = np.union1d(np.setdiff1d(codes, parts), [*taxonomy.parents.values()])
+        tables, weights = noise_tables(
+            noise,
+            taxonomy=taxonomy.whole,
+            codes=present.astype(np.uint8),
+            longest=longest,
+            radius=radius,
+        )
+        return tuple(table.divided(taxonomy) for table in tables), weights
     noise = noise_by_class(noise, taxonomy, set(codes.tolist()))
     # Values of other classes go to a row after the last, which is dropped.
     row_of = {code: row for row, code in enumerate(codes.tolist())}
