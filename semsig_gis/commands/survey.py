@@ -91,5 +91,4 @@ class SurveyPlace:
             values=result.to_dict,
             summary=[survey_sentence(result), first],
             tables=others,
-            notes=loaded.notes,
         )

@@ -82,9 +82,7 @@ def survey_tables(survey: Survey) -> tuple[Table, Table, Table]:
     """
     titles = [family_named(item.family).title for item in survey.families]
     families = survey.families
-    hidden = (
-        "Buildings hide what is behind them." if survey.occlusion else "There are no buildings."
-    )
+    hidden = "hide what is behind them" if survey.occlusion else "are not on the map"
     return (
         _seen_table(
             "Places by number of objects seen",
