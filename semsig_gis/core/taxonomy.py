@@ -68,8 +68,8 @@ class ObjectClass:
         Lower-case identifier of classes that are confused more easily with each other than with
         others, such as ``shop``; empty if it has none.
     shape : {"point", "line", "area"}
-        Whether its objects are points, or extended things of which a viewpoint sees the nearest
-        visible point.
+        Whether its objects are points, or extended things; a viewpoint sees their nearest visible
+        point.
     tall : bool, default False
         Whether its objects are landmarks, seen over roofs up to `range_m`.
 
