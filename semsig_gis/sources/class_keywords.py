@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import WILDCARD, UnknownNameError, nearest_name
 from semsig_gis.sources.catalog import data_folder, load_catalog
+from semsig_gis.sources.filters import Condition
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable, Iterator, Mapping
@@ -273,8 +274,17 @@ def _tagged_classes() -> Mapping[str, frozenset[str]]:
     """Return the class names of each OpenStreetMap tag."""
     classes: dict[str, set[str]] = {}
     for layer in load_catalog("openstreetmap").layers:
+        keys = {key for tags in layer.tags for key, _ in tags}
+        more = [values for key, values in layer.where if key not in keys]
+        if not all(Condition.parse(values).accepts(None) for values in more):
+            continue  # high-rise buildings, which are more than their tags
+        by = layer.class_by
+        for value, name in by.classes if by else ():
+            classes.setdefault(f"{by.field}={value}", set()).add(name)
         for tags in layer.tags if layer.role == "objects" else ():
             for key, values in tags:
+                # The values of the field that decides have their class already.
+                names = (layer.class_name,) if by and by.field == key else layer.classes
                 for value in values:
-                    classes.setdefault(f"{key}={value}", set()).add(layer.class_name)
-    return {tag: frozenset(names) for tag, names in classes.items()}
+                    classes.setdefault(f"{key}={value}", set()).update(names)
+    return {tag: frozenset(names - {""}) for tag, names in classes.items()}

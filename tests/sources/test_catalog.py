@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import unicodedata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from unittest.mock import Mock
@@ -16,12 +17,21 @@ from raw_layers import BENCHES, catalog_of
 from sentences import refused
 from town_catalog import MISTAKES, TOWN, mistake
 
-from semsig_gis.core import CatalogError, InputError, ObjectClass, SourceError, UnknownNameError
+from semsig_gis.core import (
+    FAMILIES,
+    OWN_CODES,
+    CatalogError,
+    InputError,
+    ObjectClass,
+    SourceError,
+    UnknownNameError,
+)
 from semsig_gis.sources import (
     DRIVERS,
     FILE_SUFFIXES,
     LayerSpec,
     WidthBy,
+    built_in_taxonomy,
     catalog_names,
     combine_catalogs,
     find_files,
@@ -229,8 +239,6 @@ def test_built_in_layers_are_complete(name: str) -> None:
         assert spec.rows is not None or name != "montpellier", spec.name
         assert spec.license != "unknown", spec.name
         assert spec.attribution, spec.name
-    # A class seen further than the build's range makes every search wider, if it occurs or not.
-    assert all(metres < 30 for metres in ranges_of(catalog.taxonomy).values())
     paper = {item.name for item in paper_taxonomy().classes}
     assert not paper & ranges_of(catalog.taxonomy).keys()
 
@@ -238,8 +246,52 @@ def test_built_in_layers_are_complete(name: str) -> None:
 def test_all_built_in_catalogues_can_be_combined() -> None:
     assert list(catalog_names()) == sorted(NAMES)
     together = combine_catalogs([load_catalog(name) for name in NAMES])
-    assert len(together.taxonomy.classes) == 11 + 7 + 11
+    derived = {
+        "building_corner",
+        "building_gap",
+        "t_junction",
+        "crossroads",
+        "large_junction",
+        "roundabout",
+        "dead_end",
+    }
+    built_in = {item.name for item in built_in_taxonomy().classes}
+    assert {item.name for item in together.taxonomy.classes} == built_in - derived
     assert len(together.layers) == sum(len(load_catalog(name).layers) for name in NAMES)
+
+
+def test_built_in_classes_fit_their_families() -> None:
+    """Codes leave room, no class is named as a family, and only landmarks are seen from far."""
+    classes = built_in_taxonomy().classes
+    assert [item.code for item in classes] == list(range(1, len(classes) + 1))
+    assert 200 <= len(classes) <= OWN_CODES - 6
+    assert built_in_taxonomy().classes[:11] == paper_taxonomy().classes
+    families = {item.family for item in classes}
+    assert families == FAMILIES.keys()
+    assert not families & {item.name for item in classes}
+    for item in classes:
+        assert item.tall == (item.family == "landmark")
+        assert (item.range_m or 30.0) <= (2000.0 if item.tall else 150.0)
+        assert not item.tall or (item.range_m or 0.0) >= 1000.0
+        # Symbols are stored as they are typed, and digits are numbers in a requirement.
+        assert unicodedata.normalize("NFC", item.symbol) == item.symbol
+        assert item.symbol.isalpha()
+
+
+def test_a_class_is_named_without_its_table(tmp_path: Path) -> None:
+    """A layer uses a built-in class by its name, and the catalogue's own one has priority."""
+    head = 'name = "town"\ntitle = "Town"\n'
+    changes = '[titles]\nbakery = "Bread"\n[ranges]\nbakery = 20\n'
+    own = '[[classes]]\ncode = 230\nsymbol = "9"\nname = "bakery"\ntitle = "Bread"\n'
+    layer = '[[layers]]\nname = "bakeries"\nclass = "bakery"\nfiles = ["a.csv"]\n'
+    path = tmp_path / "town.toml"
+    path.write_text(head + changes + layer, "utf-8")
+    bakery = dataclasses.replace(built_in_taxonomy().by_name("bakery"), range_m=20.0)
+    taxonomy = load_catalog(path).taxonomy
+    assert taxonomy.classes == (*paper_taxonomy().classes, bakery)
+    assert taxonomy.by_name("bakery").title == "Bread"
+    path.write_text(head + own + layer, "utf-8")
+    assert [item.code for item in load_catalog(path).taxonomy.classes[11:]] == [230]
 
 
 MONTPELLIER = [spec.name for spec in load_catalog("montpellier").layers]
