@@ -284,7 +284,8 @@ def _tagged_classes() -> Mapping[str, frozenset[str]]:
         for tags in layer.tags if layer.role == "objects" else ():
             for key, values in tags:
                 # The values of the field that decides have their class already.
-                names = (layer.class_name,) if by and by.field == key else layer.classes
+                decides = by is not None and by.field == key
+                names = (layer.class_name,) if decides else layer.classes
                 for value in values:
                     classes.setdefault(f"{key}={value}", set()).update(names)
     return {tag: frozenset(names - {""}) for tag, names in classes.items()}
