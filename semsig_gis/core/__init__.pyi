@@ -159,8 +159,8 @@ from .taxonomy import LETTERS as LETTERS
 from .taxonomy import MAX_CODE as MAX_CODE
 from .taxonomy import MAX_HEIGHT_M as MAX_HEIGHT_M
 from .taxonomy import MAX_RANGE_M as MAX_RANGE_M
-from .taxonomy import UNKNOWN_NAME as UNKNOWN_NAME
 from .taxonomy import OWN_CODES as OWN_CODES
+from .taxonomy import UNKNOWN_NAME as UNKNOWN_NAME
 from .taxonomy import WILDCARD as WILDCARD
 from .taxonomy import ObjectClass as ObjectClass
 from .taxonomy import Taxonomy as Taxonomy

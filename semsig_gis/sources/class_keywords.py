@@ -279,8 +279,9 @@ def _tagged_classes() -> Mapping[str, frozenset[str]]:
         if not all(Condition.parse(values).accepts(None) for values in more):
             continue  # high-rise buildings, which are more than their tags
         by = layer.class_by
-        for value, name in by.classes if by else ():
-            classes.setdefault(f"{by.field}={value}", set()).add(name)
+        if by is not None:
+            for value, name in by.classes:
+                classes.setdefault(f"{by.field}={value}", set()).add(name)
         for tags in layer.tags if layer.role == "objects" else ():
             for key, values in tags:
                 # The values of the field that decides have their class already.

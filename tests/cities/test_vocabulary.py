@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import tomllib
 from collections import defaultdict
@@ -36,6 +37,7 @@ EXTRACTS = (
     "neukolln_2024.osm",
     "paris_marais_routing.osm.pbf",
 )
+EXTENDED = {item.name for item in CATALOG.taxonomy.classes if item.shape != "point"}
 KINDS = {"n": "node", "w": "way", "r": "relation"}
 HIDING = {
     "location": {"underground", "indoor"},
@@ -163,12 +165,16 @@ def test_objects_of_each_class_equal_those_of_a_plain_loop(geodata: Path, file: 
     for element in osmium.FileProcessor(str(path)).with_locations().with_filter(KeyFilter(*keys)):
         assert isinstance(element, Node | Way | Relation)
         tags = dict(element.tags)
-        if isinstance(element, Way) and not all(item.location.valid() for item in element.nodes):
-            continue
         if isinstance(element, Relation) and tags.get("type") != "multipolygon":
             continue
         kind = element.type_str()
-        for name in classes_of(kind, tags):
+        names = classes_of(kind, tags)
+        if isinstance(element, Way):
+            # At the edge of a file nodes are missing: a part of an outline is enough.
+            known = [item.location.valid() for item in element.nodes]
+            names = names if all(known) else names & EXTENDED
+            names = names if any(map(all, itertools.pairwise(known))) else set()
+        for name in names:
             expected[name].add(f"{KINDS[kind]}/{element.id}")
     layers = read_layers(path, SPECS)
     ours = found(layers)
