@@ -32,8 +32,10 @@ from semsig_gis.core import (
     require_metric_crs,
 )
 from semsig_gis.objects.conflation import ConflationReport, conflate
+from semsig_gis.objects.derived import covered_area, derived_layers
 from semsig_gis.objects.extended import thing_points
 from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
+from semsig_gis.objects.fronts import moved_to_fronts
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import (
     OPTIONAL,
@@ -100,10 +102,14 @@ class UnreadLayer:
 
 @dataclass(frozen=True, repr=False, slots=True)
 class LoadReport(Displayed):
-    """Reports of all layers in their order, and the layers that were not read."""
+    """Reports of all layers in their order, and the layers that were not read.
+
+    `fronts` is the number of objects that were moved to the fronts of their buildings.
+    """
 
     layers: tuple[LayerReport, ...]
     unread: tuple[UnreadLayer, ...] = ()
+    fronts: int = 0
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -602,6 +608,15 @@ def assemble(
         max_distortion=max_distortion,
     )
     notes = (*notes, *extent_notes)
+    buildings, building_reports = _surroundings(layers, "buildings", system)
+    streets, street_reports = _surroundings(layers, "streets", system)
+    layers = derived_layers(
+        layers,
+        streets=streets,
+        buildings=buildings,
+        crs=system,
+        within=covered_area(layers, system),
+    )
     objects, report = build_objects(
         [layer for layer in layers if layer.spec.role == "objects"],
         taxonomy=catalog.taxonomy,
@@ -612,10 +627,13 @@ def assemble(
     merged = ConflationReport(())
     if merge and catalog.conflate:
         objects, merged = conflate(objects, dict(catalog.conflate))
-    buildings, building_reports = _surroundings(layers, "buildings", objects.crs)
-    streets, street_reports = _surroundings(layers, "streets", objects.crs)
+    fronts = 0
+    if buildings is not None and len(buildings):
+        objects, fronts = moved_to_fronts(objects, buildings, streets)
     report = LoadReport(
-        (*report.layers, *building_reports, *street_reports), _unread(catalog, layers, counted)
+        (*report.layers, *building_reports, *street_reports),
+        _unread(catalog, layers, counted),
+        fronts,
     )
     return Loaded(
         objects=with_notes(objects, (*notes, *report.notes)),

@@ -64,6 +64,7 @@ from .layer import derived_layer as derived_layer
 from .layer import transform_points as transform_points
 from .layer import transformed as transformed
 from .layer_spec import ClassBy as ClassBy
+from .layer_spec import Derivation as Derivation
 from .layer_spec import ElementKind as ElementKind
 from .layer_spec import GeometryKind as GeometryKind
 from .layer_spec import LayerSpec as LayerSpec

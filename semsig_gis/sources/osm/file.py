@@ -98,8 +98,7 @@ class _Outline(NamedTuple):
 
 def _known_parts(line: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Return the parts of a line, shape (n, 2), with known nodes."""
-    known = ~np.isnan(line[:, 0])
-    starts = np.flatnonzero(np.diff(known, prepend=False))
+    starts = np.flatnonzero(np.diff(np.isnan(line[:, 0]), prepend=True))
     return [part for part in np.split(line, starts) if len(part) > 1 and not np.isnan(part).any()]
 
 
