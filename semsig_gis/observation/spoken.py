@@ -334,7 +334,8 @@ def _items(
             following = tokens[place : place + LONGEST]
             words = [*itertools.takewhile(bool, (other["word"] for other in following))]
             size, item = _phrase(words, vocabulary, numbered=numbered)
-            if first and size == 1 and text in symbols:
+            plain = item.kind in {"thing", "other", "compass"} or text.isupper()
+            if first and size == 1 and plain and text in symbols:
                 item = _Item("symbol", symbols[text], text)
         yield item
         place += size
@@ -362,7 +363,7 @@ def _phrase(
             return size, _Item(*meaning, text)
         if (name := vocabulary.text_class(words[:size])) is not None:
             return size, _Item("sign", name, text)
-        if (codes := vocabulary.codes_of(words[:size])) is not None:
+        if (codes := vocabulary.codes_of(words[:size], own=meaning is not None)) is not None:
             return size, _Item("thing", codes, text)
         if meaning:
             return size, _Item(*meaning, text)
@@ -419,7 +420,7 @@ def _part(
     part = _Part(text=" ".join(item.text for item in items), near=near, joined=joined)
     kinds = {item.kind for item in items}
     has_thing = bool(kinds & {"thing", "sign"})
-    codes_of = {item.name: (item.code,) for item in taxonomy.classes}
+    codes_of: dict[str, Codes] = {item.name: (item.code,) for item in taxonomy.classes}
     before = ""
     while items:
         item, *items = items
@@ -431,7 +432,10 @@ def _part(
             )
         elif item.kind == "sign":
             part.sign = item.value
-            item = replace(item, kind="thing", value=codes_of.get(item.value, (WILDCARD,)))
+            codes = codes_of.get(item.value)
+            if codes is None and "text" not in kinds:
+                codes = vocabulary.codes_of(item.text.split())
+            item = replace(item, kind="thing", value=codes or (WILDCARD,))
         elif item.kind == "number":
             unit = items[0].kind if items else ""
             if unit in UNITS:

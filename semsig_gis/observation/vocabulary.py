@@ -7,13 +7,20 @@ import itertools
 import tomllib
 import unicodedata
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from semsig_gis.core import nearest_name
-from semsig_gis.sources import class_words, data_folder, other_class_words, words_for, words_of
+from semsig_gis.sources import (
+    class_words,
+    data_folder,
+    family_words,
+    other_class_words,
+    words_for,
+    words_of,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from semsig_gis.core import Taxonomy
     from semsig_gis.sources import Term
@@ -44,6 +51,8 @@ LETTERS = 3
 """Letters of the longest point of the compass, such as NNE."""
 LONGEST = 6
 """Words in the longest phrase."""
+OWN = 2
+"""Number of the first names that are of the language: those of classes, and its words."""
 STREET_SIGN, HOUSE_NUMBER = "street_sign", "house_number"
 """Names of the classes of objects that are known by what is written on them."""
 
@@ -68,22 +77,62 @@ def is_point(word: str) -> bool:
     return word.isupper() and len(word) <= LETTERS
 
 
+Endings = tuple[tuple[str, str], ...]
+"""Letters at the end of a word, and those that replace them in another form of it."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Names:
+    """The words for things in a language: `codes` by the words, joined.
+
+    `beginnings` are those of the words, and `endings` those of their forms.
+    """
+
+    codes: Mapping[str, Codes]
+    beginnings: frozenset[str]
+    endings: Endings
+
+    @classmethod
+    def of(cls, terms: Sequence[Term], language: str) -> Self:
+        """Return the words of a language; the first meaning of each counts."""
+        codes: dict[str, Codes] = {}
+        for name, codes_of_word, phrase in terms:
+            if name == language and (joined := "".join(words_of(phrase))):
+                codes.setdefault(joined, codes_of_word)
+        beginnings = frozenset(word[: end + 1] for word in codes for end in range(len(word)))
+        return cls(codes, beginnings, _endings(language))
+
+    def find(self, words: Sequence[str]) -> Codes | None:
+        """Return the codes for words of a thing, each in any form; None if it has no such words."""
+        joined = {""}
+        for word in words:
+            bases = _bases(word, self.endings)
+            joined = {
+                whole
+                for start in joined
+                for base in bases
+                if (whole := start + base) in self.beginnings
+            }
+        return next((self.codes[whole] for whole in sorted(joined) if whole in self.codes), None)
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Vocabulary:
     """The words of a language, then those of the other languages that have one meaning.
 
-    `classes` are class codes by the words of a thing, joined and in any form, and `others` such
-    words for things that the taxonomy has no class for; `phrases` are meanings by words, `letters`
-    bearings by capitals, and `names` words for things of the language. `texts` are the words for a
-    street sign and a house number, each with the name of the class.
+    `families` and `classes` have the words for things, of this language and then of the others, and
+    `others` those for things that the taxonomy has no class for; `phrases` are meanings by words,
+    `letters` bearings by capitals, and `names` words for things of the language. `texts` are the
+    words for a street sign and a house number, each with the name of the class.
     """
 
     language: str
-    classes: Mapping[str, Codes]
+    families: tuple[Names, ...]
+    classes: tuple[Names, ...]
+    others: tuple[Names, ...]
     phrases: Mapping[Words, Meaning]
     letters: Mapping[str, float]
     names: tuple[str, ...]
-    others: Container[str]
     texts: Mapping[str, str]
 
     @classmethod
@@ -92,24 +141,32 @@ class Vocabulary:
 
         def count(language: str) -> int:
             letters, own = _phrases()[language]["letters"], _own_words(taxonomy, language)
+            endings = _endings(language)
             return sum(
-                word in letters if is_point(word) else plain_word(word) in own for word in words
+                word in letters
+                if is_point(word)
+                else not own.isdisjoint(_bases(plain_word(word), endings))
+                for word in words
             )
 
         return _vocabulary(taxonomy, max(_phrases(), key=count))
 
-    def codes_of(self, words: Sequence[str]) -> Codes | None:
-        """Return the class codes for the words of a thing, None if they are for no class."""
-        return self.classes.get(_joined(words))
+    def codes_of(self, words: Sequence[str], *, own: bool = False) -> Codes | None:
+        """Return the class codes for the words of a thing, None if they are for no class.
+
+        `own` is whether the words must be of this language.
+        """
+        tables = OWN if own else None
+        return _find(words, self.families[:tables]) or _find(words, self.classes[:tables])
 
     def text_class(self, words: Sequence[str]) -> str | None:
         """Return the name of the class if words are for a street sign or a house number."""
-        return self.texts.get(_joined(words))
+        return self.texts.get("".join(_parts(words)))
 
     def elsewhere(self, words: Sequence[str]) -> str:
         """Return the last of some words that are for a thing without a class here, or nothing."""
         for start in range(len(words)):
-            if _joined(words[start:]) in self.others:
+            if _find(words[start:], self.others):
                 return " ".join(words[start:])
         return ""
 
@@ -126,13 +183,36 @@ class Vocabulary:
         return nearest_name(text, self.names)
 
 
-def _joined(words: Sequence[str]) -> str:
-    """Return the words of a thing joined; empty if they cannot be of one."""
-    names = [words_of(word) for word in words]
+def _parts(words: Sequence[str]) -> list[str]:
+    """Return the words of a thing as they are compared; none if they cannot be of one."""
+    parts = [words_of(word) for word in words]
     # A thing does not begin or end with an article or a letter, such as S for south.
-    if not names[0] or not names[-1] or min(len(words[0]), len(words[-1])) == 1:
-        return ""
-    return "".join(itertools.chain(*names))
+    if not parts[0] or not parts[-1] or min(len(words[0]), len(words[-1])) == 1:
+        return []
+    return [*itertools.chain(*parts)]
+
+
+def _find(words: Sequence[str], names: Sequence[Names]) -> Codes | None:
+    """Return the class codes for the words of a thing, None if no names have them."""
+    parts = _parts(words)
+    joined = "".join(parts)
+    # All words as they are go before their forms, which count only in the own language: "turn" is
+    # a form of a German word for a door.
+    exact = (table.codes.get(joined) for table in names)
+    forms = (table.find(parts) for table in names[:OWN] if parts)
+    return next(filter(None, itertools.chain(exact, forms)), None)
+
+
+@functools.lru_cache(maxsize=4096)
+def _bases(word: str, endings: Endings) -> frozenset[str]:
+    """Return the words that a word may be a form of, and the word itself."""
+    return frozenset(
+        {word}.union(
+            base
+            for last, ending in endings
+            if word.endswith(ending) and len(base := word.removesuffix(ending) + last) > SHORT_WORD
+        )
+    )
 
 
 @functools.cache
@@ -166,58 +246,60 @@ def _shared() -> dict[Words, Meaning]:
     return {words: next(iter(values)) for words, values in meanings.items() if len(values) == 1}
 
 
-def _forms(phrase: str, endings: Sequence[str]) -> set[str]:
-    """Return a word for a thing with each of its words in each form, joined."""
-    forms = [
-        [word, *(word + ending for ending in endings if len(word) > SHORT_WORD)]
-        for word in words_of(phrase)
-    ]
-    return {"".join(words) for words in itertools.product(*forms)} - {""}
+@functools.cache
+def _endings(language: str) -> Endings:
+    """Return the endings of words for things in a language; English for names."""
+    table = _phrases().get(language or "en", {})
+    endings = (("", ending) for ending in table.get("endings", ()))
+    return (*endings, *table.get("changed", {}).items())
 
 
-def _by_form(terms: Sequence[Term], language: str) -> dict[str, Codes]:
-    """Return the class codes by the words of a thing in any form."""
-    classes: dict[str, Codes] = {}
-    # All words as they are go before their forms, the own language before others.
-    for exact in (True, False):
-        for name in dict.fromkeys(["", language, *_phrases(), *(name for name, _, _ in terms)]):
-            endings = () if exact else _phrases().get(name or "en", {}).get("endings", ())
-            for _, codes, phrase in (item for item in terms if item[0] == name):
-                for form in _forms(phrase, endings):
-                    classes.setdefault(form, codes)
-    return classes
+@functools.lru_cache(maxsize=64)
+def _names(taxonomy: Taxonomy) -> dict[str, tuple[Names, Names, Names]]:
+    """Return the words for families, for classes and for other things, by language."""
+    parts = family_words(taxonomy), class_words(taxonomy), other_class_words(taxonomy)
+    languages = dict.fromkeys(["", *_phrases(), *(name for part in parts for name, _, _ in part)])
+    return {
+        name: (Names.of(parts[0], name), Names.of(parts[1], name), Names.of(parts[2], name))
+        for name in languages
+    }
 
 
 @functools.lru_cache(maxsize=64)
 def _vocabulary(taxonomy: Taxonomy, language: str) -> Vocabulary:
-    terms, others = class_words(taxonomy), other_class_words(taxonomy)
-    names = tuple(word for name, _, word in terms if name in {"", language})
+    names = _names(taxonomy)
+    # Names and titles are English before they are of another language: "Bank" is German for bench.
+    first = ["", "en"] if language == "en" else [language, ""]
+    order = [names[name] for name in dict.fromkeys([*first, *names])]
+    families, classes, others = zip(*order, strict=True)
     return Vocabulary(
         language=language,
-        classes=_by_form(terms, language),
+        families=families,
+        classes=classes,
+        others=others,
         phrases={**_shared(), **_meanings(language)},
         letters=_phrases()[language]["letters"],
-        names=names,
-        others=frozenset(_by_form(others, language)),
+        names=tuple(
+            word
+            for name, _, word in (*class_words(taxonomy), *family_words(taxonomy))
+            if name in {"", language}
+        ),
         texts={
-            form: name
+            "".join(words_of(phrase)): name
             for name in (STREET_SIGN, HOUSE_NUMBER)
             for phrase in words_for(name)
-            for form in _forms(phrase, ())
         },
     )
 
 
 @functools.lru_cache(maxsize=64)
 def _own_words(taxonomy: Taxonomy, language: str) -> frozenset[str]:
-    """Return the single words of a language."""
-    endings = ["", *_phrases()[language]["endings"]]
-    terms = (*class_words(taxonomy), *other_class_words(taxonomy))
+    """Return the single words of a language, without other forms of those for things."""
+    terms = (*class_words(taxonomy), *family_words(taxonomy), *other_class_words(taxonomy))
     things = {
-        word + ending
+        word
         for name, _, phrase in terms
         if name == language
         for word in map(plain_word, phrase.split())
-        for ending in endings
     }
     return frozenset(things.union(*_meanings(language)))

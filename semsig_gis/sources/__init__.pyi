@@ -17,6 +17,8 @@ from .class_keywords import Match as Match
 from .class_keywords import Term as Term
 from .class_keywords import class_codes as class_codes
 from .class_keywords import class_words as class_words
+from .class_keywords import families as families
+from .class_keywords import family_words as family_words
 from .class_keywords import keywords as keywords
 from .class_keywords import other_class_words as other_class_words
 from .class_keywords import words_for as words_for

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import re
 import tomllib
 import unicodedata
@@ -24,10 +23,10 @@ CAMEL_CASE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 # Keywords up to this length must be a whole word, because too many words start with them.
 WHOLE_WORD_LETTERS = 3
 ARTICLES = frozenset(
-    {"a", "al", "alla", "and", "au", "aux", "d", "da", "das", "de", "dei", "del", "della", "dem",
-     "den", "der", "des", "di", "die", "do", "dos", "du", "e", "el", "en", "et", "for", "fur",
-     "het", "i", "il", "in", "l", "la", "las", "le", "les", "lo", "los", "mit", "o", "of", "on",
-     "per", "pour", "the", "to", "und", "van", "von"}
+    {"a", "al", "alla", "and", "au", "aux", "d", "da", "das", "de", "degli", "dei", "del", "dell",
+     "della", "delle", "dello", "dem", "den", "der", "des", "di", "die", "do", "dos", "du", "e",
+     "el", "en", "et", "for", "fur", "het", "i", "il", "in", "l", "la", "las", "le", "les", "lo",
+     "los", "mit", "o", "of", "on", "per", "pour", "the", "to", "und", "van", "von"}
 )  # fmt: skip
 
 
@@ -184,7 +183,7 @@ def class_codes(word: str, taxonomy: Taxonomy) -> tuple[int, ...]:
 SPOKEN = "said"
 """Key of words for classes in observations; layers are not recognised by them."""
 MEMBERS = "classes"
-"""Key of the classes that a word stands for, in addition to those of the family of its name."""
+"""Key of the classes that a word stands for, if they are not those of the family of its name."""
 
 
 @functools.cache
@@ -193,47 +192,58 @@ def _content() -> dict[str, Any]:
 
 
 def class_words(taxonomy: Taxonomy, *, languages: Container[str] | None = None) -> tuple[Term, ...]:
-    """Return the words for the classes and families, each with its language and class codes.
+    """Return the words for the classes, each with its language and class codes.
 
     The language of names and titles is empty, because they may be in any. Words that only people
     say may be limited to the languages `languages`.
     """
     words: list[Term] = [("", (WILDCARD,), "unknown"), ("en", (WILDCARD,), "something")]
-    classes = _content()["classes"]
-    for item in taxonomy.classes:
-        codes: Codes = (item.code,)
-        words.append(("", codes, item.title))
-        words += _terms(item.name, codes, classes.get(item.name, {}), languages)
-    for family, table in _content()["families"].items():
-        if codes := _family_codes(family, taxonomy):
-            words += _terms(family, codes, table, languages)
-    return tuple(words)
+    words += [("", (item.code,), item.title) for item in taxonomy.classes]
+    tables = [
+        (item.name, (item.code,), _content()["classes"].get(item.name, {}))
+        for item in taxonomy.classes
+    ]
+    return (*words, *_terms(tables, languages))
+
+
+def family_words(
+    taxonomy: Taxonomy, *, languages: Container[str] | None = None
+) -> tuple[Term, ...]:
+    """Return the words of `class_words` for families, and others for several classes."""
+    tables = _content()["families"]
+    return tuple(
+        _terms(
+            ((family, codes, tables[family]) for family, codes in families(taxonomy).items()),
+            languages,
+        )
+    )
+
+
+def families(taxonomy: Taxonomy) -> dict[str, Codes]:
+    """Return the class codes of each family, and of each other name for several classes."""
+    names = _content()["families"]
+    return {name: codes for name in names if (codes := _family_codes(name, taxonomy))}
 
 
 def other_class_words(taxonomy: Taxonomy) -> tuple[Term, ...]:
     """Return the words of `class_words` for what a taxonomy has not, as of `WILDCARD`."""
     own = {item.name for item in taxonomy.classes}
     tables = {name: table for name, table in _content()["classes"].items() if name not in own}
-    tables |= {
-        name: table
-        for name, table in _content()["families"].items()
-        if not _family_codes(name, taxonomy)
-    }
-    terms = (_terms(name, (WILDCARD,), table, None) for name, table in tables.items())
-    return tuple(itertools.chain.from_iterable(terms))
+    used = families(taxonomy)
+    tables |= {name: table for name, table in _content()["families"].items() if name not in used}
+    return tuple(_terms((name, (WILDCARD,), table) for name, table in tables.items()))
 
 
 def words_for(name: str) -> tuple[str, ...]:
     """Return all words for a class or a family, in all languages."""
     table = {**_content()["classes"], **_content()["families"]}.get(name, {})
-    return tuple(word for _, _, word in _terms(name, (), table, None))
+    return tuple(word for _, _, word in _terms([(name, (), table)]))
 
 
 def _family_codes(family: str, taxonomy: Taxonomy) -> Codes:
     """Return the class codes of a family, or of a word for several classes."""
-    members = frozenset(_content()["families"][family].get(MEMBERS, ()))
-    own = {item.name for item in taxonomy.classes if item.family == family}
-    return _codes_of(members | own, taxonomy)
+    own = [item.name for item in taxonomy.classes if item.family == family]
+    return _codes_of(_content()["families"][family].get(MEMBERS, own), taxonomy)
 
 
 def _codes_of(names: Container[str], taxonomy: Taxonomy) -> Codes:
@@ -242,30 +252,35 @@ def _codes_of(names: Container[str], taxonomy: Taxonomy) -> Codes:
 
 
 def _terms(
-    name: str,
-    codes: Codes,
-    table: Mapping[str, Any],
-    languages: Container[str] | None,
+    tables: Iterable[tuple[str, Codes, Mapping[str, Any]]],
+    languages: Container[str] | None = None,
 ) -> Iterator[Term]:
-    """Yield a name and its keywords, each with its language and class codes."""
-    yield "", codes, name.replace("_", " ")
-    by_key = dict(table)
-    more = by_key.pop(SPOKEN, {}).items()
-    lists = [pair for pair in by_key.items() if pair[0] not in {"fields", MEMBERS}]
-    lists += [pair for pair in more if languages is None or pair[0] in languages]
-    for key, phrases in lists:
-        yield from ((key, codes, word) for word in phrases)
+    """Yield names and their words, each with its language and class codes.
+
+    Words that people say go before those of layers, which may be for several kinds of things.
+    """
+    tables = [*tables]
+    for name, codes, table in tables:
+        yield "", codes, name.replace("_", " ")
+        for language, phrases in table.get(SPOKEN, {}).items():
+            if languages is None or language in languages:
+                yield from ((language, codes, word) for word in phrases)
+    for _, codes, table in tables:
+        for language, phrases in table.items():
+            if language not in {SPOKEN, MEMBERS, "fields"}:
+                yield from ((language, codes, word) for word in phrases)
 
 
 @functools.lru_cache(maxsize=8)
 def _class_words(taxonomy: Taxonomy) -> Mapping[str, tuple[Codes, str]]:
     """Return class codes and original word by normalized word (lower case, no blanks)."""
     codes_of: dict[str, tuple[Codes, str]] = {}
-    terms = class_words(taxonomy, languages={"en"})
-    # Names and titles have priority, then English.
-    for _, codes, word in sorted(terms, key=lambda item: (item[0] != "", item[0] != "en")):
-        if joined := "".join(words_of(word)):
-            codes_of.setdefault(joined, (codes, word))
+    for terms in (class_words, family_words):
+        words = terms(taxonomy, languages={"en"})
+        # Names and titles have priority, then English.
+        for _, codes, word in sorted(words, key=lambda item: (item[0] != "", item[0] != "en")):
+            if joined := "".join(words_of(word)):
+                codes_of.setdefault(joined, (codes, word))
     return codes_of
 
 

@@ -23,12 +23,12 @@ from semsig_gis.observation import (
     parse_view,
     read_description,
 )
-from semsig_gis.sources import data_folder, load_catalog
+from semsig_gis.sources import built_in_taxonomy, data_folder, paper_taxonomy
 
 if TYPE_CHECKING:
     from semsig_gis.observation import View, ViewRecord
 
-TAXONOMY = load_catalog("openstreetmap").taxonomy
+TAXONOMY = built_in_taxonomy()
 
 
 def read(row: dict[str, Any], radius: float = 30.0) -> View:
@@ -211,7 +211,6 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"see": "bench left, nothing else"}, "'nothing else' does not say what is not in sight"),
     ({"see": "rien à gauche, banc à droite"}, "does not say what is not in sight"),
     ({"see": "no ?"}, "'no ?' does not say what is not in sight"),
-    ({"see": "bike rack left"}, "the map has no bike rack"),
     ({"see": "no smoking sign"}, "'smoking' in 'no smoking sign' is not understood"),
     ({"see": "blorb at 40, a lamb at 42"}, "class 'blorb' is unknown"),
     ({"see": "no bench next to the tree at 40"}, "says where something is not"),
@@ -286,28 +285,39 @@ def expected_parts(meaning: str) -> list[str]:
     return sorted(parts)
 
 
+def kinds_of(codes: list[int]) -> str:
+    """Return the name of a class, of a family, or of several classes."""
+    names = {item.code: item.name for item in TAXONOMY.classes}
+    families = {item.family for item in TAXONOMY.classes}
+    same = [name for name in families if TAXONOMY.family_codes(name).tolist() == codes]
+    return "|".join(same or [names.get(code, "?") for code in codes])
+
+
 def understood_parts(text: str) -> list[str]:
     """Return the things of a sentence in the form of ``sentences.toml``."""
     view, unplaced, absent = parse_seen({"see": text}, taxonomy=TAXONOMY, radius=30.0)
-    relative = view.photos[0].north_sigma is not None
-    parts = [f"no {TAXONOMY.by_code(code).name}" for code in absent]
-    parts += [TAXONOMY.by_code(code).name for code in unplaced]
-    for row, code in enumerate([] if view.codes is None else view.codes.tolist()):
-        part = TAXONOMY.by_code(code).name
+    parts = [f"no {kinds_of([code])}" for code in absent]
+    parts += [kinds_of([code]) for code in unplaced]
+    parts += [f"'{sign}'" for sign in view.signs]
+    for row, scores in enumerate(view.class_scores()):
+        part = kinds_of(np.flatnonzero(scores).tolist())
         if view.bearings is not None:
             bearing = view.bearings[row]
             offset = bearing if bearing <= 180 else bearing - 360
+            relative = view.photos[view.photo_rows[row]].north_sigma is not None
             part += f" {offset:+g}" if relative else f" at {bearing:g}"
         if view.ranges is not None and not math.isnan(view.ranges[row]):
             is_word = view.range_errors is not None and not math.isnan(view.range_errors[row])
             part += " near" if is_word else f" {view.ranges[row]:g} m"
+        if view.texts is not None and view.texts[row]:
+            part += f" '{view.texts[row]}'"
         parts.append(part)
     return sorted(parts)
 
 
 @pytest.mark.parametrize("language", SENTENCES)
 def test_sentences_of_people_are_understood(language: str) -> None:
-    assert len(SENTENCES[language]) == 10
+    assert len(SENTENCES[language]) == 24
     for text, meaning in SENTENCES[language].items():
         assert understood_parts(text) == expected_parts(meaning), text
 
@@ -415,12 +425,130 @@ def test_words_that_are_not_used_are_noted() -> None:
         ("old bike rack, left, bench right", "bike rack"),
         ("no bike rack, bench right", "bike rack"),
         ("Fahrradständer links, Bank rechts", "Fahrradständer"),
+        ("bench right, shops behind", "shops"),
+        ("bench right, house number left", "house number"),
     ],
 )
 def test_things_that_only_other_maps_have_are_not_used(text: str, word: str) -> None:
-    assert understood_parts(text) == ["bench +90"]
-    (note,) = read({"see": text}).notes
+    view = parse_view({"see": text}, taxonomy=paper_taxonomy())
+    assert view.to_dict(paper_taxonomy())["types"] == "L"
+    (note,) = view.notes
     assert f"the map has no {word}" in note
+    with refused(SemsigError, "the map has no"):
+        parse_view({"see": word}, taxonomy=paper_taxonomy())
+
+
+@pytest.mark.parametrize(
+    ("text", "parts", "notes"),
+    [
+        (
+            "church at 30, blorb at 42, a bench at 50",
+            ["bench at 50", "church at 30"],
+            ["'blorb at 42' was not used, because 'blorb' is unknown; the nearest is"],
+        ),
+        ("lamp at abc", ["street_light"], ["'abc' was not used."]),
+        ("lamp at 40 soon", ["street_light at 40"], ["'soon' was not used."]),
+        ("lamp left, a big blorb, 12 m away", ["street_light -90"], ["a big blorb, 12 m away"]),
+        ("blorb 42, lamp left", ["street_light -90"], ["'blorb 42' was not used"]),
+        ("tree stump left, lamp right", ["street_light +90"], ["'stump' is not understood"]),
+        ("no smoking sign, lamp left", ["street_light -90"], ["'smoking' is not understood"]),
+        (
+            "lamp at 10, bench next to the blorb",
+            ["bench", "street_light at 10"],
+            ["'the blorb' was not used"],
+        ),
+    ],
+)
+def test_unknown_words_are_left_out_with_a_note(
+    text: str, parts: list[str], notes: list[str]
+) -> None:
+    assert understood_parts(text) == parts
+    view, _, _ = parse_seen({"see": text}, taxonomy=TAXONOMY, radius=30.0)
+    assert len(view.notes) == len(notes)
+    for note, words in zip(view.notes, notes, strict=True):
+        assert words in note
+
+
+@pytest.mark.parametrize(
+    ("text", "bearings", "errors"),
+    [
+        ("tree at 40 with a bench next to it", [40, 40], [None, 15]),
+        ("bench next to the tree, lamp next to it at 40", [40, 40, 40], [21.21, 15, None]),
+        ("bench between the tree at 350 and the lamp at 30", [10, 30, 350], [11.55, None, None]),
+        ("tree N, lamp E, a bench between them", [0, 45, 90], [13, 31.83, 13]),
+        ("bench between two trees at 40", [40, 40, 40], [15, None, None]),
+        ("bench at 40, a shop", [40, 40], [None, 180]),
+    ],
+)
+def test_directions_follow_from_those_of_other_things(
+    text: str, bearings: list[float], errors: list[float | None]
+) -> None:
+    row = parsed({"see": text})
+    assert row["bearings"] == pytest.approx(bearings)
+    assert row["bearing_errors"] == pytest.approx(errors, abs=0.01)
+
+
+def test_ends_of_unknown_or_opposite_directions_say_nothing() -> None:
+    for text in ("bench between the tree and the lamp at 30", "tree N, lamp S, bench between them"):
+        assert "bench" in understood_parts(text)
+
+
+def test_word_for_a_family_has_equal_scores_of_its_classes() -> None:
+    codes = TAXONOMY.family_codes("shop")
+    for row in (
+        {"see": "shop at 40"},
+        {"detections": [{"class": "shop", "bearing": 40}]},
+        {"bearings": [40], "scores": [{"shop": 1.0}]},
+    ):
+        (scores,) = column(read(row), "scores")
+        assert scores[codes] == pytest.approx(1.0 / len(codes))
+        assert scores.sum() == pytest.approx(1.0)
+    view, _, absent = parse_seen({"see": "no shops"}, taxonomy=TAXONOMY, radius=30.0)
+    assert absent == tuple(codes)
+    assert len(view) == 0
+    assert understood_parts("a bakery shop at 40") == ["bakery at 40"]
+
+
+def test_directions_from_north_and_from_an_unknown_sight_are_of_two_photos() -> None:
+    view = read(
+        {"see": "shop 'Boulangerie P' at 40, street sign 'Rue du Pau', house number 12 left"}
+    )
+    assert view.texts == ("Boulangerie P", "12")
+    assert view.signs == ("Rue du Pau",)
+    assert [photo.north_sigma for photo in view.photos] == [None, math.inf]
+    assert column(view, "photo").tolist() == [0, 1]
+    (note,) = view.notes
+    assert "say it as well" in note
+
+
+@pytest.mark.parametrize(
+    ("text", "read_text"),
+    [
+        ("house number 12 left", "12"),
+        ("house number 12a left", "12a"),
+        ("house number 12 bis left", "12 bis"),
+        ("house number 12-14 left", "12-14"),
+        ("shop 'L'Atelier d'Or' left", "L'Atelier d'Or"),
+        ("shop called “Marks & Spencer” left", "Marks & Spencer"),
+        ("a shop „Zum Löwen“ left", "Zum Löwen"),
+        ("a shop named »Zum  Löwen« left", "Zum Löwen"),
+        ("'12 o'clock' left", "12 o'clock"),
+    ],
+)
+def test_text_on_a_thing(text: str, read_text: str) -> None:
+    assert read({"see": text}).texts == (read_text,)
+
+
+def test_apostrophes_are_no_quotation_marks() -> None:
+    view = read({"see": "l'arbre d'en face, les bancs d'à côté à 40"})
+    assert view.texts is None
+
+
+def test_text_of_a_detection() -> None:
+    items = [{"class": "shop", "bearing": 1, "text": "Aux  4 vents"}, {"class": "L", "bearing": 2}]
+    assert read({"detections": items}).texts == ("Aux 4 vents", "")
+    view = read({"see": "bench at 40, a shop 'Sole'", "signs": ["Via Roma"]})
+    assert view.signs == ("Via Roma", "Sole")
 
 
 @pytest.mark.parametrize(
@@ -431,7 +559,7 @@ def test_suggestions_are_in_the_language_of_the_sentence(text: str, nearest: str
     with refused(SemsigError, f"the nearest is '{nearest}'"):
         read({"see": text})
     with pytest.raises(SemsigError) as caught:
-        read({"see": "pub at 40"})
+        read({"see": "pubbel at 40"})
     assert "poubelle" not in str(caught.value)
 
 

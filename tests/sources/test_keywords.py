@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import tomllib
+from collections import defaultdict
+
 import pytest
 from sentences import refused
 
 from semsig_gis.core import WILDCARD, ObjectClass, Taxonomy, UnknownNameError
-from semsig_gis.sources import class_codes, load_catalog, paper_taxonomy
+from semsig_gis.sources import (
+    built_in_taxonomy,
+    class_codes,
+    data_folder,
+    families,
+    family_words,
+    load_catalog,
+    paper_taxonomy,
+    words_of,
+)
 
 TAXONOMY = load_catalog("openstreetmap").taxonomy
 WORDS = {
@@ -58,3 +70,51 @@ def test_names_of_the_taxonomy_have_priority() -> None:
 def test_unknown_word_is_refused_with_the_nearest(word: str, message: str) -> None:
     with refused(UnknownNameError, message):
         class_codes(word, paper_taxonomy())
+
+
+KEYWORDS = tomllib.loads((data_folder() / "keywords.toml").read_text(encoding="utf-8"))
+LANGUAGES = ("en", "de", "fr", "es", "it", "pt")
+
+
+def test_classes_and_families_have_words_in_six_languages() -> None:
+    every = built_in_taxonomy()
+    names = {item.name for item in every.classes}
+    assert set(KEYWORDS["classes"]) == names
+    assert {item.family for item in every.classes} <= set(KEYWORDS["families"])
+    for name, table in {**KEYWORDS["families"], **KEYWORDS["classes"]}.items():
+        assert set(table.get("classes", ())) <= names
+        for language in LANGUAGES:
+            # English has the name itself.
+            assert language == "en" or table.get(language) or table["said"].get(language), name
+
+
+def test_word_that_people_say_is_for_one_class() -> None:
+    every = built_in_taxonomy()
+    classes: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for name, table in KEYWORDS["classes"].items():
+        tables = {**table.get("said", {}), "name": [name.replace("_", " ")]}
+        for language, phrases in tables.items():
+            for phrase in phrases:
+                assert phrase == phrase.lower()
+                assert phrase.isascii(), phrase
+                classes[language]["".join(words_of(phrase))].add(name)
+    for language, words in classes.items():
+        for word, names in words.items():
+            assert len(names) == 1, (language, word, names)
+    # A word for several classes may be one for some of these.
+    codes = {item.name: item.code for item in every.classes}
+    for language, several, phrase in family_words(every):
+        for name in classes[language]["".join(words_of(phrase))]:
+            assert codes[name] in several, (language, phrase, name)
+
+
+def test_word_for_a_family_is_for_its_classes_in_the_taxonomy() -> None:
+    every = built_in_taxonomy()
+    assert class_codes("shops", every) == tuple(every.family_codes("shop"))
+    some = Taxonomy((every.by_name("bakery"), every.by_name("rails")))
+    assert families(some)["shop"] == (every.by_name("bakery").code,)
+    assert class_codes("track", some) == (every.by_name("rails").code,)
+    with refused(UnknownNameError, "'church' is unknown"):
+        class_codes("church", some)
+    # The names of classes are theirs, also where a family has the word.
+    assert class_codes("tower", every) == (every.by_name("tower").code,)

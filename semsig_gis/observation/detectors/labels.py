@@ -28,11 +28,11 @@ from semsig_gis.core import (
     pairs,
     read_table,
 )
-from semsig_gis.sources import built_in_taxonomy, class_codes, data_folder
+from semsig_gis.sources import built_in_taxonomy, class_codes, data_folder, families
 from semsig_gis.storage import parse_toml, read_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping, Sequence
     from importlib.resources.abc import Traversable
 
     from semsig_gis.core import Taxonomy
@@ -58,7 +58,8 @@ class _Label(FileTable):
         tuple[tuple[str, float], ...],
         Parsed(_shares, str | dict[str, Annotated[float, number("a chance", 0, 1, above=True)]]),
         Accepts(
-            "the name of a class, or a table of classes with their chances, which sum to 1 at most"
+            "the name of a class or a family, or a table of these with their chances, which sum to "
+            "1 at most"
         ),
         file_key("class"),
     ]
@@ -81,8 +82,11 @@ class Meaning:
     part: bool = False
 
     @classmethod
-    def parse(cls, value: object, where: str, classes: set[str]) -> Self:
-        """Parse an entry of a map; CatalogError if it is not valid."""
+    def parse(cls, value: object, where: str, classes: Mapping[str, Sequence[str]]) -> Self:
+        """Parse an entry of a map; CatalogError if it is not valid.
+
+        `classes` are names of classes and families, each with the classes that it stands for.
+        """
         label = read_table(_Label, value if isinstance(value, dict) else {"class": value}, where)
         for name, _ in label.classes:
             if name not in classes:
@@ -92,8 +96,12 @@ class Meaning:
                 )
         height, sigma = label.height_m, label.height_sigma
         check_height(height, sigma, where)
+        shares: dict[str, float] = {}
+        for name, share in label.classes:
+            for item in classes[name]:
+                shares[item] = shares.get(item, 0.0) + share / len(classes[name])
         return cls(
-            label.classes,
+            tuple(shares.items()),
             None if height is None or sigma is None else (height, sigma),
             part=label.part,
         )
@@ -137,7 +145,7 @@ class LabelMap:
         """
         sources = list(maps) or list(label_maps())
         taxonomies = taxonomy, built_in_taxonomy()
-        classes = {item.name for part in taxonomies for item in part.classes}
+        classes = _classes(taxonomies)
         meanings: list[tuple[str, Meaning]] = []
         built_in = _built_in_maps()
         for source in sources:
@@ -199,6 +207,21 @@ class LabelMap:
             for label, meaning in self.meanings
             if {"*", "?"} & set(label)
         ]
+
+
+def _classes(taxonomies: Iterable[Taxonomy]) -> dict[str, list[str]]:
+    """Return the names of classes and families, each with the classes that it stands for.
+
+    Those of a family are from the first taxonomy that has any.
+    """
+    classes: dict[str, list[str]] = {}
+    for taxonomy in taxonomies:
+        for item in taxonomy.classes:
+            classes[item.name] = [item.name]
+    for taxonomy in taxonomies:
+        for name, codes in families(taxonomy).items():
+            classes.setdefault(name, [taxonomy.by_code(code).name for code in codes])
+    return classes
 
 
 def label_maps() -> tuple[str, ...]:

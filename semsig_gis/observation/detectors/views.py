@@ -282,6 +282,7 @@ class ViewBuilder:
             for name, share in meaning.classes:
                 row[self._code(name)] += round(share * box.score, SCORE_DIGITS)
             row[WILDCARD] = 0.0
+            row[:] = row / max(row.sum(), 1.0)  # rounded up
             row[WILDCARD] = max(round(1.0 - row.sum(), SCORE_DIGITS), 0.0)
             if meaning.height is not None:
                 height[:] = meaning.height

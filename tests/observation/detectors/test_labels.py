@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 from sentences import refused
 
-from semsig_gis.core import CatalogError, InputError, UnknownNameError
+from semsig_gis.core import CatalogError, InputError, Taxonomy, UnknownNameError
 from semsig_gis.observation import LabelMap, Meaning, label_maps
 from semsig_gis.sources import built_in_taxonomy, paper_taxonomy
 
@@ -18,7 +18,10 @@ ALL = LabelMap.open([], built_in_taxonomy())
 
 
 def test_built_in_maps() -> None:
-    assert label_maps() == ("cityscapes", "coco", "mapillary_vistas", "panoramax")
+    assert label_maps() == (
+        *("ade20k", "cityscapes", "coco", "lvis", "mapillary_vistas", "objects365", "open_images"),
+        "panoramax",
+    )
     with refused(UnknownNameError, "'cocoa'", "the nearest is 'coco'"):
         LabelMap.open(["cocoa"], paper_taxonomy())
 
@@ -36,6 +39,13 @@ def test_built_in_maps() -> None:
         ("regulatory--stop--g1", ["indicator"]),
         ("marking--discrete--crosswalk-zebra", ["pedestrian_crossing"]),
         ("pole", ["street_light", "indicator", "traffic_light"]),
+        ("trash bin Can", ["waste_basket", "waste_container"]),
+        ("telephone_pole", ["power_pole"]),
+        ("Waste container", ["waste_basket", "waste_container"]),
+        ("ashcan", ["waste_basket"]),
+        ("construction--flat--rail-track", ["rails", "tram_track"]),
+        ("Signage - Advertisement", ["advertising_column", "billboard", "poster_box"]),
+        ("fast food", []),
         ("person", []),
         ("marking--general", []),
         ("object--vehicle--car", []),
@@ -48,6 +58,29 @@ def test_classes_of_labels(label: str, classes: list[str]) -> None:
     meaning = ALL.find(label)
     assert meaning is not None
     assert [name for name, _ in meaning.classes] == classes
+
+
+@pytest.mark.parametrize("name", label_maps())
+def test_chances_of_built_in_maps_are_at_most_one(name: str) -> None:
+    for taxonomy in (built_in_taxonomy(), paper_taxonomy()):
+        for _, meaning in LabelMap.open([name], taxonomy).meanings:
+            assert sum(share for _, share in meaning.classes) <= 1 + 1e-9
+
+
+def test_family_is_any_of_its_classes_in_the_city(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text(
+        '[labels]\nfront = "shop"\nsign = { class = { shop = 0.6, indicator = 0.2 } }\n'
+    )
+    every = built_in_taxonomy()
+    shops = [every.by_code(code).name for code in every.family_codes("shop")]
+    meaning = LabelMap.open([mine], every).find("front")
+    assert meaning is not None
+    assert dict(meaning.classes) == pytest.approx(dict.fromkeys(shops, 1.0 / len(shops)))
+    city = Taxonomy((every.by_name("bakery"), every.by_name("bank"), every.by_name("butcher")))
+    meaning = LabelMap.open([mine], city).find("sign")
+    assert meaning is not None
+    assert dict(meaning.classes) == pytest.approx({"bakery": 0.3, "butcher": 0.3, "indicator": 0.2})
 
 
 def test_sign_of_panoramax_is_plate() -> None:
