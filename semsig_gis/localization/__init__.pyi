@@ -133,6 +133,7 @@ from .noise.presets import named_noise as named_noise
 from .noise.table import LONGEST_TABLE as LONGEST_TABLE
 from .noise.table import NoiseTable as NoiseTable
 from .noise.table import database_tables as database_tables
+from .noise.table import extent_sigma as extent_sigma
 from .noise.table import mean_table as mean_table
 from .noise.table import noise_tables as noise_tables
 from .noise.table import query_bearings as query_bearings

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core import BEARING_UNITS, FULL_TURN
+from semsig_gis.core import BEARING_UNITS, FULL_TURN, HALF_TURN
 from semsig_gis.evaluation.identifiability.kernels import (
     BLOCK_CELLS,
     LINE_CELLS,
@@ -26,7 +26,7 @@ from semsig_gis.evaluation.identifiability.kernels import (
     fill_columns,
     score_cells,
 )
-from semsig_gis.localization import query_bearings
+from semsig_gis.localization import extent_sigma, query_bearings
 from semsig_gis.observation import FULL_VIEW
 
 if TYPE_CHECKING:
@@ -226,16 +226,21 @@ def _spreads(
 
     The density, shape (levels, units, bins), is that of an object at each unit of bin 0.
     """
-    sigma = table.sigmas
-    if table.position_sigma == 0:
+    kinds, sigma = table.row_of[database.codes], table.sigmas
+    of_entries = np.empty(0)
+    if database.extents is not None:
+        of_entries = np.hypot(sigma[kinds, database.distance_units], extent_sigma(database.extents))
+        of_entries = np.minimum(of_entries, HALF_TURN)
+    if table.position_sigma == 0 and not len(of_entries):
         levels, level = np.unique(sigma, return_inverse=True)
     else:
-        levels = np.geomspace(sigma.min(), sigma.max(), NOISE_LEVELS)
+        widest = max(sigma.max(), of_entries.max(initial=0.0))
+        levels = np.geomspace(sigma.min(), widest, NOISE_LEVELS)
         middles = np.sqrt(levels[1:] * levels[:-1])
         level = np.searchsorted(middles, sigma)
-    level_of = np.zeros((256, 256), np.uint8)
-    level_of[table.codes] = level.reshape(sigma.shape)
-    spread_of = level_of[database.codes, database.distance_units]
+    spread_of = level.reshape(sigma.shape).astype(np.uint8)[kinds, database.distance_units]
+    if len(of_entries):
+        spread_of = np.searchsorted(middles, of_entries).astype(np.uint8)
     inside = (np.arange(BIN_UNITS) + 0.5) * (BIN_DEGREES / BIN_UNITS)
     edges = np.arange(BINS + 1) * BIN_DEGREES
     offsets = edges[None, None, :] - inside[None, :, None]

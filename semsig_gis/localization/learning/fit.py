@@ -35,7 +35,7 @@ from semsig_gis.localization.likelihood.association import (
     near_pairs,
     sum_products,
 )
-from semsig_gis.localization.noise.table import NoiseTable
+from semsig_gis.localization.noise.table import NoiseTable, extent_sigma
 from semsig_gis.observation import View
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ class Evidence:
         out: they change no expected count.
         """
         table, views, pairs = replace(self.start, sigma=sigma), self.views, self.pairs
-        spreads = bearing_spreads(table, self.kinds, self.distances)
+        spreads = bearing_spreads(table, self.kinds, self.distances, views.extents)
         inside, _ = self.detections.inside(self.owners, views.bearings, spreads)
         units = table.scale.units(self.distances)
         mask = (inside > 0) | (table.leaving[self.kinds, units] > 0)
@@ -132,6 +132,7 @@ class Evidence:
                 codes=views.codes[mask],
                 bearings=views.bearings[mask],
                 distances=views.distances[mask],
+                extents=None if views.extents is None else views.extents[mask],
             ),
             pairs=Pairs(
                 starts=ends[pairs.starts],
@@ -309,8 +310,11 @@ def _bearing_errors(
 ) -> NDArray[np.float64]:
     """Return the squared bearing noise of pairs, and the number of errors they count for."""
     objects, kind = evidence.pairs.objects, evidence.pair_kinds
-    # A difference is due to the place and to the bearing noise, in proportion to their variances.
+    # A difference is due to the bearing noise, and to the place and the extent of the object, in
+    # proportion to their variances.
     place = np.degrees(model.position_sigma / evidence.distances[objects])
+    if evidence.views.extents is not None:
+        place = np.hypot(place, extent_sigma(evidence.views.extents[objects]))
     own = model.sigma[kind] ** 2
     share = own / (own + place**2)
     squares = (evidence.pairs.away * share) ** 2 + place**2 * share

@@ -24,7 +24,7 @@ from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, signed_degrees
 from semsig_gis.database import visible_objects_in
 from semsig_gis.localization.likelihood.index import CellScores, own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
-from semsig_gis.localization.noise.table import database_tables
+from semsig_gis.localization.noise.table import database_tables, extent_sigma
 from semsig_gis.observation import View
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ def associate(
     owners = np.repeat(np.arange(len(views)), views.lengths)
     distances = at_distances(table, views)
     units = table.scale.units(distances)
-    spreads = bearing_spreads(table, kinds, distances)
+    spreads = bearing_spreads(table, kinds, distances, views.extents)
     # By object: the chances of its detection and of a miss.
     inside, squares = photos.inside(owners, views.bearings, spreads)
     near = table.detected[rows[owners], kinds]
@@ -244,10 +244,15 @@ def at_distances(table: NoiseTable, views: VisibleObjects) -> NDArray[np.float64
 
 
 def bearing_spreads(
-    table: NoiseTable, kinds: NDArray[np.int64], distances: NDArray[np.float64]
+    table: NoiseTable,
+    kinds: NDArray[np.int64],
+    distances: NDArray[np.float64],
+    extents: NDArray[np.float64] | None,
 ) -> NDArray[np.float64]:
-    """Return the deviation of the bearing of objects in degrees, by class and distance."""
+    """Return the deviation of the bearing of objects in degrees, by class, distance and extent."""
     spreads = np.hypot(table.sigma[kinds], np.degrees(table.position_sigma / distances))
+    if extents is not None:
+        spreads = np.hypot(spreads, extent_sigma(extents))
     return np.minimum(spreads, HALF_TURN)
 
 

@@ -148,6 +148,7 @@ def sum_associations(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
     """
     offsets, kinds, beyond = objects.offsets, objects.kinds, objects.beyond
     bearing_units, distance_units = objects.bearing_units, objects.distance_units
+    extents = objects.extent_sigma
     bearings, ranges, range_sigma = photo.bearings, photo.ranges, photo.range_sigma
     bearing_errors = photo.bearing_errors
     own, other, density, disc = photo.own, photo.other, photo.density, photo.disc
@@ -238,6 +239,9 @@ def sum_associations(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
                         kind, unit = kinds[low + entry], distance_units[low + entry]
                         bearing = (bearing_units[low + entry] + 0.5) * _UNIT
                         spread = sigma[model, kind, unit]
+                        if len(extents):
+                            wide = math.hypot(spread, extents[low + entry])
+                            spread = min(wide, FULL_TURN / 2.0)
                         if len(sectors):
                             inside[entry] = 0.0
                             for sector in range(len(sectors)):

@@ -19,6 +19,7 @@ import numpy as np
 from semsig_gis.core import BEARING_UNITS, FULL_TURN, signed_degrees
 from semsig_gis.localization.likelihood.index import photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable
+from semsig_gis.localization.noise.table import WIDEST_SIGMA, extent_sigma
 from semsig_gis.observation import View
 
 if TYPE_CHECKING:
@@ -178,7 +179,10 @@ def _density(database: SignatureDatabase, table: NoiseTable, cell: int) -> NDArr
     length = min(len(kinds), len(table.detected) - 1)
     near, names = table.detected[length, kinds], table.named(length)[kinds]
     bearings = database.bearing_units[part, None] * (FULL_TURN / BEARING_UNITS)
-    away = signed_degrees(BINS - bearings) / table.sigmas[kinds, units][:, None]
+    sigmas = table.sigmas[kinds, units]
+    if database.extents is not None:
+        sigmas = np.minimum(np.hypot(sigmas, extent_sigma(database.extents[part])), WIDEST_SIGMA)
+    away = signed_degrees(BINS - bearings) / sigmas[:, None]
     peaks = np.exp(-0.5 * away**2)
     peaks *= (near * table.remaining[kinds, units] / peaks.sum(axis=1))[:, None]
     # Clutter, and objects that come into range in any direction.

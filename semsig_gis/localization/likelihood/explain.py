@@ -342,6 +342,7 @@ class _Scene:
             self.view,
             offsets=np.arange(photos + 1) * size,
             **{name: np.tile(getattr(self.view, name), photos) for name in OBJECT_FIELDS},
+            extents=None if self.view.extents is None else np.tile(self.view.extents, photos),
         )
         pairs = near_pairs(views.offsets, views.bearings, detections.starts, detections.bearings)
         logliks, inside = np.log(weights), np.zeros((photos, size))

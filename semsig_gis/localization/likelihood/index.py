@@ -29,7 +29,7 @@ from semsig_gis.localization.likelihood.records import LANES, BinnedObjects, Lev
 from semsig_gis.localization.likelihood.turns import TURNS, TurnPrior, TurnScores
 from semsig_gis.localization.noise.beyond import noise_with_objects_beyond
 from semsig_gis.localization.noise.model import ROUNDING, cell_noise, place_noise
-from semsig_gis.localization.noise.table import database_tables, mean_table
+from semsig_gis.localization.noise.table import database_tables, extent_sigma, mean_table
 from semsig_gis.observation import View, check_north
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.noise.table import NoiseTable
 
     _Models = tuple[tuple[NoiseTable, ...], NDArray[np.float64]]
+    _Extents = tuple[NDArray[np.float64], NDArray[np.int64]] | None
     _PhotoScores = tuple[NDArray[np.float32], NDArray[np.float32] | None]
     _Scorer = Callable[[BinnedObjects], _PhotoScores]
 
@@ -52,6 +53,7 @@ FINE = 8 * BINS
 """Bearing steps of a detection."""
 EXACT_GROUPS = 4  # classes with more different errors are grouped by similar ones
 ERROR_RATIO = 1.3  # of errors that count as similar
+EXTENT_RATIO = 3.0  # of errors of extended things that do
 DISTANCE_LEVELS = 64
 """Distances at which errors are computed."""
 
@@ -144,12 +146,23 @@ class LikelihoodIndex(Displayed):
     @cached_property
     def _quarters(self) -> tuple[NoiseLevels, NDArray[np.float64]]:
         models, points = self._points(2)
-        return NoiseLevels.of(mean_table(*models)), points
+        return NoiseLevels.of(mean_table(*models), self._extents), points
+
+    @cached_property
+    def _extents(self) -> _Extents:
+        """Sums of squares of `extent_sigma` and numbers of objects, by class and distance unit."""
+        database, shape = self.database, self.table.fading.shape
+        if database.extents is None:
+            return None
+        cells = self.table.row_of[database.codes] * shape[1] + database.distance_units
+        sums = np.bincount(cells, extent_sigma(database.extents) ** 2, math.prod(shape))
+        numbers = np.bincount(cells, minlength=math.prod(shape))
+        return np.asarray(sums.reshape(shape)), np.asarray(numbers.reshape(shape))
 
     @cached_property
     def levels(self) -> NoiseLevels:
         """The mean of the models at some distances."""
-        return NoiseLevels.of(self.table)
+        return NoiseLevels.of(self.table, self._extents)
 
     @cached_property
     def objects(self) -> BinnedObjects:
@@ -386,8 +399,8 @@ class NoiseLevels:
     model: LevelModel
 
     @classmethod
-    def of(cls, table: NoiseTable) -> NoiseLevels:
-        """Return the levels of a table."""
+    def of(cls, table: NoiseTable, extents: _Extents = None) -> NoiseLevels:
+        """Return the levels of a table; `extents` are those of `LikelihoodIndex`."""
         metres, detected = table.distances, table.detected
         remaining, leaving = table.remaining, table.leaving
         # Levels are spaced by the logarithm of the distance; a level is the mean of its units.
@@ -400,19 +413,40 @@ class NoiseLevels:
             return np.bincount(level_of, values, DISTANCE_LEVELS) / count
 
         distances = np.exp(by_level(np.log(metres)))
-        # Classes with the same errors share their rows.
+        # Classes with the same errors share their rows; those of extended things only with others
+        # that are about as wide.
         errors = np.stack([table.sigma, table.range_sigma], axis=1)
-        groups, group_of = np.unique(errors, axis=0, return_inverse=True)
-        if len(groups) > EXACT_GROUPS:
+        wide = np.zeros(len(errors))
+        if extents is not None:
+            squares, numbers = (part.sum(axis=1) for part in extents)
+            ratio = np.hypot(table.sigma, np.sqrt(squares / np.maximum(numbers, 1))) / table.sigma
+            wide = np.rint(np.log(ratio) / math.log(EXTENT_RATIO))
+        groups, group_of = np.unique(np.column_stack([wide, errors]), axis=0, return_inverse=True)
+        if len(groups) > EXACT_GROUPS + len(np.unique(wide)) - 1:
             # Each group takes time, and the best cells are ranked again by exact errors.
-            steps = np.rint(np.log(errors) / math.log(ERROR_RATIO))
+            steps = np.column_stack([wide, np.rint(np.log(errors) / math.log(ERROR_RATIO))])
             _, group_of = np.unique(steps, axis=0, return_inverse=True)
             members = np.bincount(group_of.reshape(-1))
+            columns = (wide, *errors.T)
             groups = np.stack(
-                [np.bincount(group_of.reshape(-1), column) / members for column in errors.T], axis=1
+                [np.bincount(group_of.reshape(-1), column) / members for column in columns], axis=1
             )
         turned = np.degrees(table.position_sigma / distances)
-        sigma = np.minimum(np.hypot(groups[:, :1], turned), FULL_TURN / 2.0)
+        sigma = np.hypot(groups[:, 1:2], turned)
+        if extents is not None:
+            # The mean square of the objects of the group at the level, or at any level.
+            squares, numbers = (
+                np.stack([np.bincount(group_of.reshape(-1), column) for column in part.T], axis=1)
+                for part in extents
+            )
+            by_group = squares.sum(axis=1) / np.maximum(numbers.sum(axis=1), 1)
+            totals, counts = (
+                np.stack([np.bincount(level_of, row, DISTANCE_LEVELS) for row in part])
+                for part in (squares, numbers)
+            )
+            means = np.where(counts > 0, totals / np.maximum(counts, 1), by_group[:, None])
+            sigma = np.hypot(sigma, np.sqrt(means))
+        sigma = np.minimum(sigma, FULL_TURN / 2.0)
         fine = _wrapped_normal(np.arange(FINE) * (FULL_TURN / FINE), sigma)
         # If the chances do not depend on the length of a signature, one row does for all lengths.
         same = (detected == detected[0]).all() and (table.misnamed == table.misnamed[0]).all()
@@ -420,7 +454,7 @@ class NoiseLevels:
             table=table,
             level_of=level_of,
             sigma=sigma,
-            range_sigma=groups[:, 1],
+            range_sigma=groups[:, 2],
             distances=distances,
             blur=table.position_sigma / distances,
             fine=fine.astype(np.float32),

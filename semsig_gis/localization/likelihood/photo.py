@@ -36,7 +36,7 @@ from semsig_gis.localization.likelihood.records import (
     PlaceObjects,
     TurnGrid,
 )
-from semsig_gis.localization.noise.table import stack_models
+from semsig_gis.localization.noise.table import extent_sigma, stack_models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -178,6 +178,7 @@ def photo_loglik(
         bearing_units=bearing_units.astype(np.uint16),
         distance_units=first.scale.units(views.distances),
         beyond=views.distances > limits + first.scale.rounding(limits),
+        extent_sigma=np.empty(0) if views.extents is None else extent_sigma(views.extents),
     )
     prior = np.zeros(turns.shape) if log_prior is None else np.ascontiguousarray(log_prior)
     grid = TurnGrid(np.ascontiguousarray(turns, dtype=np.float64), prior)

@@ -61,6 +61,8 @@ class PlaceObjects(NamedTuple):
 
     Place i sees the objects ``offsets[i]:offsets[i + 1]``, with class rows `kinds`, in units of the
     database. Some are `beyond` the range: seen only by an observer elsewhere in the cell.
+    `extent_sigma` is the deviation in degrees of bearings because objects are extended; it is empty
+    if none are.
     """
 
     offsets: NDArray[np.int64]
@@ -68,6 +70,7 @@ class PlaceObjects(NamedTuple):
     bearing_units: NDArray[np.uint16]
     distance_units: NDArray[np.uint8]
     beyond: NDArray[np.bool_]
+    extent_sigma: NDArray[np.float64]
 
 
 class PhotoArrays(NamedTuple):

@@ -326,6 +326,11 @@ def stack_models(tables: Sequence[NoiseTable], weights: NDArray[np.float64]) -> 
     )
 
 
+def extent_sigma(extents: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the deviation of a bearing anywhere within some extents, all in degrees."""
+    return np.asarray(extents / math.sqrt(12.0))
+
+
 def query_bearings(query: Signature) -> NDArray[np.float64]:
     """Return the bearings of a query; raise InputError without any."""
     if query.bearings is None:
