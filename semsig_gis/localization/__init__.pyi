@@ -104,9 +104,14 @@ from .likelihood.priors import area_prior as area_prior
 from .likelihood.priors import position_prior as position_prior
 from .likelihood.priors import raster_prior as raster_prior
 from .likelihood.priors import weight_prior as weight_prior
+from .likelihood.reading import Reading as Reading
+from .likelihood.reading import TextRecord as TextRecord
+from .likelihood.reading import read_view as read_view
 from .likelihood.route import LOST as LOST
 from .likelihood.route import moved_chances as moved_chances
 from .likelihood.route import route_posteriors as route_posteriors
+from .likelihood.texts import plain_text as plain_text
+from .likelihood.texts import text_fits as text_fits
 from .likelihood.turns import TURNS as TURNS
 from .locator import AnyMethod as AnyMethod
 from .locator import Locator as Locator

@@ -218,7 +218,7 @@ def explain(
     radius: float = 30.0,
     heading: float | Sequence[float] = 0.0,
     footprints: Footprints | None = None,
-    said: Signature | None = None,
+    plain: Signature | None = None,
 ) -> Explanation:
     """Explain which objects of a query are which street objects, if it was seen from a place.
 
@@ -227,13 +227,15 @@ def explain(
     objects behind `footprints` are not visible. Chances are sums over all one-to-one associations;
     each model of a mixture is weighted by the likelihood of the query at this place. Objects
     of classes that the city does not have are left out; a query of no others raises `InputError`.
+    `plain` is the same query with scores of whole classes, if the scores of `query` are of parts of
+    classes.
     """
     x, y = map(float, xy)
     place = np.array([[x, y]])
     view = visible_objects_at(objects, place, index=index, radius=radius, footprints=footprints)
     codes = np.flatnonzero(np.bincount(objects.codes)).astype(np.uint8)
     scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, radius, objects)
-    return scene.explanation(query, noise, heading, query if said is None else said)
+    return scene.explanation(query, noise, heading, query if plain is None else plain)
 
 
 def explain_cell(
@@ -243,7 +245,7 @@ def explain_cell(
     *,
     database: SignatureDatabase,
     heading: float | Sequence[float] = 0.0,
-    said: Signature | None = None,
+    plain: Signature | None = None,
 ) -> Explanation:
     """Explain which objects of a query are which objects of a cell, using only the database.
 
@@ -255,7 +257,7 @@ def explain_cell(
     view = visible_objects_in(database, np.array([cell]))
     codes, radius = database.present_codes, database.spec.radius
     scene = _Scene((x, y), view, codes, database.taxonomy, database.crs, radius)
-    return scene.explanation(query, noise, heading, query if said is None else said)
+    return scene.explanation(query, noise, heading, query if plain is None else plain)
 
 
 OBJECT_FIELDS = ("objects", "codes", "bearings", "distances")
@@ -288,9 +290,9 @@ class _Scene:
         query: Signature,
         noise: Noise,
         heading: float | Sequence[float],
-        said: Signature,
+        plain: Signature,
     ) -> Explanation:
-        """Return the verdicts on the objects of a query, `said` to be so, and of the scene."""
+        """Return the verdicts on the objects of a query and of the scene; see `explain`."""
         view = View.of(query)
         turns = np.broadcast_to(heading, len(view.photos)).astype(np.float64)
         # `replace` keeps the order of the objects, which is that of the rows of the query.
@@ -305,7 +307,7 @@ class _Scene:
             own = np.flatnonzero(view.photo_rows == number)
             places = _partners(pairs.chances[:, own])
             partners |= {int(own[place]): entry for place, entry in places.items()}
-        rows = self._detection_rows(view, pairs.chances, partners, View.of(said))
+        rows = self._detection_rows(view, pairs.chances, partners, View.of(plain))
         for entry, (missed, inside) in enumerate(
             zip(pairs.missed.tolist(), pairs.inside.tolist(), strict=True)
         ):
@@ -367,14 +369,14 @@ class _Scene:
         query: View,
         chances: NDArray[np.float64],
         partners: dict[int, int],
-        said: View,
+        plain: View,
     ) -> list[dict[str, Any]]:
         """Return a row for each object of the query of a known class."""
         bearings = query_bearings(query)
         taxonomy = self.taxonomy
         if isinstance(taxonomy, DividedTaxonomy):
             taxonomy = taxonomy.whole
-        scores, names = said.class_scores(), said.class_names(taxonomy)
+        scores, names = plain.class_scores(), plain.class_names(taxonomy)
         likeliest = scores == scores.max(axis=1, keepdims=True)
         ranges = np.full(len(query), np.nan) if query.ranges is None else query.ranges
         rows = []

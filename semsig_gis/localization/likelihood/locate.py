@@ -267,21 +267,29 @@ class Location(Answer):
                 "explained=1."
             )
 
-        def described(name: str | None, bearing: float | None, metres: float | None) -> str:
+        def described(
+            name: str | None, bearing: float | None, metres: float | None, text: str | None = None
+        ) -> str:
             if name is None:
                 return ""
-            title = self.taxonomy.title_of(name).lower()
+            title = self.taxonomy.title_of(name).lower() + (f" {text!r}" if text else "")
             at = "" if bearing is None else f" at {bearing:.0f}°"
             return f"{title}{at}" + ("" if metres is None else f", {metres:.0f} m")
 
         undirected, rest = self.without_direction(self.explanations[0])
         rows = []
         for number, row in enumerate(self.explanations[0].to_dict(self.north)["rows"]):
-            view_part = described(row["query_class"], row["query_bearing"], row["query_range"])
+            read = row.get("query_text")
+            there_read = row.get("object_text") if read else None
+            view_part = described(
+                row["query_class"], row["query_bearing"], row["query_range"], read
+            )
             verdict = row["verdict"]
             if number in undirected:
                 view_part, verdict = described(row["object_class"], None, None), "matched"
-            there = described(row["object_class"], row["object_bearing"], row["distance"])
+            there = described(
+                row["object_class"], row["object_bearing"], row["distance"], there_read
+            )
             rows.append((view_part, there, IN_WORDS[verdict], round(row["chance"], 2)))
         rows += [
             (view_part, there, IN_WORDS["matched" if there else "false"], math.nan)
@@ -551,7 +559,7 @@ class LikelihoodLocator:
     def _usable_objects(self, query: Signature) -> Signature:
         """Return a query with bearings from grid north, without classes that no cell sees."""
         reading = self._reading(query)
-        return reading.view if reading.said is None else reading.said
+        return reading.view if reading.plain is None else reading.plain
 
     def _reading(self, query: Signature) -> Reading:
         """Return what is read in a query; the index keeps the last ones."""
@@ -727,13 +735,13 @@ class LikelihoodLocator:
         """Explain a query at a cell: at its likeliest part, or at its centre."""
         reading, store = self._reading(query), self.store
         database, noise = self.index.database, self.index.noise
-        divided = reading.said is not None
+        divided = reading.plain is not None
         view = reading.view if divided else self.north.to_grid(query)
         headings = scores.headings_at(cell)
         if store is None:
             database = reading.index.database
             explanation = explain_cell(
-                view, cell, noise, database=database, heading=headings, said=reading.said
+                view, cell, noise, database=database, heading=headings, plain=reading.plain
             )
             return explanation.numbered(reading.rows) if divided else explanation
         x, y = database.xy[cell].tolist()
@@ -751,7 +759,7 @@ class LikelihoodLocator:
             index=store.index,
             radius=database.spec.radius,
             heading=headings,
-            said=reading.said,
+            plain=reading.plain,
             footprints=store.buildings_around(
                 np.array([[x, y]]), distance=database.near_reach, occlusion=database.occlusion
             ),

@@ -65,7 +65,7 @@ if TYPE_CHECKING:
 else:
     shapely = lazy_loader.load("shapely")
 
-SHARES = {LETTERS_OFF: 0.08, PART: 0.17, EXACT: 0.6}
+SHARES = {LETTERS_OFF: 0.1, PART: 0.2, EXACT: 0.55}
 """Chance that what is read on an object fits its text on the map at each level."""
 MISREAD = 0.15
 """Chance that it does not fit: it was read wrongly, or the map is wrong."""
@@ -438,7 +438,7 @@ class Reading:
     """A view with what was read, for the index and the store in which it is evidence.
 
     `view` has the objects that are used, which are `rows` of the query. If texts are in its scores,
-    `said` is the view with those of classes. `extra` is added to the log-likelihood of each cell,
+    `plain` is the view with those of classes. `extra` is added to the log-likelihood of each cell,
     shape (n,). `records` say what each text fits.
     """
 
@@ -446,7 +446,7 @@ class Reading:
     rows: NDArray[np.int64]
     index: LikelihoodIndex
     store: ObjectStore | None = None
-    said: View | None = None
+    plain: View | None = None
     extra: NDArray[np.float64] | None = None
     records: tuple[TextRecord, ...] = ()
     notes: tuple[str, ...] = ()
@@ -531,15 +531,15 @@ class _Reader:
         if view.texts is None:
             return replace(reading, view=usable_objects(view, self.index.table.codes)[0])
         divided = self._divided(tuple(sorted({*filter(None, view.texts)})))
-        said = _in_any_direction(view)
-        scored, lacking = divided.view(said)
+        plain = _in_any_direction(view)
+        scored, lacking = divided.view(plain)
         extra = np.zeros(len(self.index.database)) if reading.extra is None else reading.extra
         return replace(
             reading,
             view=scored,
             index=divided.index,
             store=divided.store,
-            said=said,
+            plain=plain,
             extra=extra + lacking,
         )
 

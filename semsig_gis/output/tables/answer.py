@@ -220,10 +220,28 @@ def query_sentences(answer: Answer) -> Iterator[str]:
             north = "; north unknown"
         of = f" of photo {number + 1}" if len(view.photos) > 1 else ""
         yield f"Seen{of}: {objects}{looked}{north}."
+    if view.signs:
+        yield f"Read somewhere: {', '.join(map(repr, view.signs))}."
+    if isinstance(answer, Location):
+        yield from _fit_sentences(answer)
     knowledge = answer.known if isinstance(answer, Location) else {}
     for name, label in (("seen", "Seen somewhere"), ("absent", "Not there")):
         if titles := knowledge.get(name):
             yield f"{label}: {', '.join(titles).lower()}."
+
+
+FITS = {"exact": "is", "part": "fits", "letters off": "is nearly"}
+
+
+def _fit_sentences(location: Location) -> Iterator[str]:
+    """Yield the names of the map that each text fits."""
+    for record in location.texts:
+        if names := record["names"]:
+            thing = "street" if record["kind"] == "street" else "object"
+            rest = record["count"] - len(names)
+            more = f" and {rest:,} more {thing}s" if thing == "object" and rest > 0 else ""
+            street = "the street " if thing == "street" else ""
+            yield f"{record['text']!r} {FITS[record['fit']]} {street}{' or '.join(names)}{more}."
 
 
 def tie_sentences(answer: Localization) -> Iterator[str]:
@@ -306,6 +324,8 @@ def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
         parts.append(f"{_direction(float(view.bearings[row]), photo)}{spread}")
     if view.ranges is not None and not math.isnan(view.ranges[row]):
         parts.append(f"{view.ranges[row]:.2g} m away")
+    if text := view.text_rows[row]:
+        parts.append(f"that reads {text!r}")
     return " ".join(parts)
 
 
@@ -339,8 +359,9 @@ def _explanation_table(rank: int, explanation: Explanation, answer: Location) ->
     if rank > 1:
         return title
 
-    def said(name: str | None) -> str:
-        return "" if name is None else answer.taxonomy.title_of(name).lower()
+    def said(name: str | None, text: str | None = None) -> str:
+        title = "" if name is None else answer.taxonomy.title_of(name).lower()
+        return f"{title} {text!r}" if text else title
 
     def measure(value: float | None, spec: str, unit: str, before: str = "") -> str:
         return "" if value is None else f"{before}{value:{spec}}{unit}"
@@ -359,9 +380,9 @@ def _explanation_table(rank: int, explanation: Explanation, answer: Location) ->
             (
                 row["verdict"],
                 f"{row['chance']:.2f}",
-                said(row["query_class"]),
+                said(row["query_class"], row["query_text"]),
                 bearing_text(row["query_bearing"]) + measure(row["query_range"], ".1f", " m", ", "),
-                said(row["object_class"]),
+                said(row["object_class"], row["query_text"] and row["object_text"]),
                 bearing_text(row["object_bearing"]),
                 measure(row["bearing_error"], "+.1f", "°"),
                 measure(row["distance"], ".1f", " m"),
