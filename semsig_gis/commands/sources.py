@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -12,7 +13,7 @@ from typing_extensions import TypedDict
 
 from semsig_gis.commands.load import catalogs
 from semsig_gis.commands.model import Option, Reporter, Result, command
-from semsig_gis.core import Table
+from semsig_gis.core import Table, codes_by_family, family_named
 
 if TYPE_CHECKING:
     from semsig_gis.sources import Catalog, LayerSpec, Rules
@@ -148,36 +149,62 @@ def _about(catalog: Catalog) -> Iterator[str]:
         f"{catalog.title}: {len(catalog.layers)} layers; place: "
         f"{catalog.place or 'not stated'}; needs {_needs_text(catalog)}."
     )
-    yield f"Classes: {', '.join(item.title.lower() for item in catalog.classes)}."
+    titles = {item.code: item.title.lower() for item in catalog.classes}
+    for family, codes in codes_by_family(catalog.taxonomy, titles).items():
+        heading = family_named(family).title if family else "Classes"
+        yield f"{heading}: {', '.join(titles[code] for code in codes)}."
     yield f"Licence: {catalog.license}."
 
 
 def _details(catalog: Catalog) -> Iterator[str | Table]:
-    # An exclusion that all layers of objects share is shown once.
-    rules = {spec.exclusions for spec in catalog.layers if spec.role == "objects"}
-    common = rules.pop() if len(rules) == 1 else ()
-    yield Table.of(
-        f"{catalog.title} ({catalog.url})",
-        ("layer", "class", "from", "filter", "licence", "note"),
-        (
-            [
-                f"{spec.name} (optional)" if spec.optional else spec.name,
-                _class_text(spec),
-                _origin_text(spec),
-                _filter_text(spec, common),
-                spec.license,
-                spec.note,
-            ]
-            for spec in catalog.layers
-        ),
-    )
+    # The exclusion that most layers of objects share is shown once.
+    rules = Counter(spec.exclusions for spec in catalog.layers if spec.role == "objects")
+    common, count = rules.most_common(1)[0] if rules else ((), 0)
+    common = common if count > 1 or len(rules) == 1 else ()
+    for title, layers in _layers_by_family(catalog).items():
+        yield Table.of(
+            title,
+            ("layer", "class", "from", "filter", "licence", "note"),
+            (
+                [
+                    f"{spec.name} (optional)" if spec.optional else spec.name,
+                    _class_text(spec),
+                    _origin_text(spec),
+                    _filter_text(spec, common),
+                    spec.license,
+                    spec.note,
+                ]
+                for spec in layers
+            ),
+        )
     if common:
-        yield f"Left out of every layer of objects: {', '.join(_rules(common))}."
+        which = "every layer" if len(rules) == 1 else "layers"
+        others = "" if len(rules) == 1 else ", where the filter states nothing else"
+        yield f"Left out of {which} of objects{others}: {', '.join(_rules(common))}."
     yield Table.of(
         "Classes",
-        ("symbol", "code", "class", "title"),
-        ([c.symbol, c.code, c.name, c.title] for c in catalog.classes),
+        ("symbol", "code", "class", "title", "family"),
+        ([c.symbol, c.code, c.name, c.title, c.family] for c in catalog.classes),
     )
+
+
+def _layers_by_family(catalog: Catalog) -> dict[str, list[LayerSpec]]:
+    """Return the layers by the title of their table: the catalogue's, or that of a family."""
+    code_of = {item.name: item.code for item in catalog.classes}
+    families = codes_by_family(catalog.taxonomy, code_of.values())
+    title = f"{catalog.title} ({catalog.url})"
+    if len(families) == 1:
+        return {title: list(catalog.layers)}
+    # A layer of several families is in that of its first class.
+    family_of = {code: family for family, codes in families.items() for code in codes}
+    tables: dict[str, list[LayerSpec]] = {
+        f"{title}: {family_named(family).title}": [] for family in families
+    }
+    for spec in catalog.layers:
+        family = family_of[code_of[spec.classes[0]]] if spec.classes else None
+        heading = "Buildings and streets" if family is None else family_named(family).title
+        tables.setdefault(f"{title}: {heading}", []).append(spec)
+    return tables
 
 
 def _needs_text(catalog: Catalog) -> str:

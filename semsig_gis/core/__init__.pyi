@@ -20,6 +20,7 @@ from .errors import SemsigError as SemsigError
 from .errors import SourceError as SourceError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import extra as extra
+from .errors import listed as listed
 from .errors import nearest_name as nearest_name
 from .families import FAMILIES as FAMILIES
 from .families import Family as Family

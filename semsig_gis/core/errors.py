@@ -7,7 +7,9 @@ import difflib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
+
+NAMES_LISTED = 40
 
 
 class SemsigError(Exception):
@@ -57,6 +59,13 @@ def nearest_name(name: str, names: Iterable[str]) -> str:
     lower_case = {candidate.lower(): candidate for candidate in names}
     matches = difflib.get_close_matches(name.lower(), lower_case, n=1, cutoff=0.5)
     return f"; the nearest is {lower_case[matches[0]]!r}" if matches else ""
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names for a message, of many the first ones and the number of the others."""
+    others = len(names) - NAMES_LISTED
+    more = f" and {others} others" if others > 0 else ""
+    return ", ".join(names[:NAMES_LISTED]) + more
 
 
 @contextlib.contextmanager

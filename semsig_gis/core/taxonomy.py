@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import CatalogError, UnknownNameError, nearest_name
+from semsig_gis.core.errors import CatalogError, UnknownNameError, listed, nearest_name
 from semsig_gis.core.inputs import (
     Flag,  # noqa: TC001 - of fields
     check_fields,
@@ -211,10 +211,13 @@ class Taxonomy(Displayed):
         codes = {item.code for item in self.classes}
         symbols = {item.symbol for item in self.classes}
         code = next((code for code in range(OWN_CODES, MAX_CODE + 1) if code not in codes), None)
-        plain = ascii_letters + digits
-        more = "".join(map(chr, range(0xC0, 0x450)))
-        letters = (sign for sign in name if sign in plain), plain, re.findall(f"[{LETTERS}]", more)
-        free = (sign for sign in itertools.chain(*letters) if sign not in symbols)
+        own = (sign for sign in name if sign.isalnum())
+        more = re.findall(f"[{LETTERS}]", "".join(map(chr, range(0xC0, 0x450))))
+        free = (
+            sign
+            for sign in itertools.chain(own, ascii_letters, more, digits)
+            if sign not in symbols
+        )
         symbol = next(free, None)
         if code is None or symbol is None:
             raise CatalogError(
@@ -251,7 +254,7 @@ class Taxonomy(Displayed):
         names = [item.name for item in self.classes]
         raise UnknownNameError(
             f"class {name!r} is unknown{nearest_name(name, names)}; "
-            f"the classes are {', '.join(names)}; Taxonomy.extended adds one, as does [[classes]] "
+            f"the classes are {listed(names)}; Taxonomy.extended adds one, as does [[classes]] "
             "in a catalogue."
         )
 
@@ -260,7 +263,8 @@ class Taxonomy(Displayed):
         if result := self._class_with("code", code):
             return result
         raise UnknownNameError(
-            f"class code {code} is unknown; the codes are {[c.code for c in self.classes]}."
+            f"class code {code} is unknown; the codes are "
+            f"{listed([str(item.code) for item in self.classes])}."
         )
 
     def by_symbol(self, symbol: str) -> ObjectClass:

@@ -18,11 +18,9 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core import (
-    MAX_CODE,
     CatalogError,
     CrsError,
     EmptyResultError,
-    ObjectClass,
     SemsigError,
     SourceError,
     crs_text,
@@ -46,10 +44,9 @@ from semsig_gis.sources import (
     WGS84,
     Condition,
     LayerSpec,
-    catalog_names,
+    built_in_taxonomy,
     load_catalog,
     off_the_globe,
-    paper_taxonomy,
     reader,
     words_of,
 )
@@ -68,8 +65,6 @@ EDIT = "EDIT"
 FILTERS_SHOWN = 8
 # Maximum number of rows per value of a field that may identify objects.
 MAX_ROWS_PER_ID = 10
-FIRST_OWN_CODE = 12
-SYMBOLS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789"
 GEOMETRIES = {"Point": "point", "LineString": "line", "LinearRing": "line", "Polygon": "polygon"}
 
 
@@ -246,34 +241,21 @@ def _metric_crs(layers: Sequence[LayerSample]) -> str:
 
 
 def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
-    """Yield stanzas for classes that the paper does not have."""
-    taxonomies = [load_catalog(name).taxonomy for name in catalog_names()]
-    shipped = {item.name: item for taxonomy in taxonomies for item in taxonomy.classes}
-    existing = list(shipped.values())
-    paper = {item.name for item in paper_taxonomy().classes}
+    """Yield stanzas for classes that are not built in."""
+    taxonomy = built_in_taxonomy()
+    built_in = {item.name for item in taxonomy.classes}
     used = [draft.guess.name for draft in drafts if draft.guess.name and not draft.guess.is_role]
     possible = [name for draft in drafts if draft.class_by for name in draft.class_by[1].values()]
     for name in dict.fromkeys([*used, *possible]):
-        if name in paper:
+        if name in built_in:
             continue
-        item = shipped.get(name) or _new_class(name, existing)
-        existing.append(item)
+        taxonomy = taxonomy.extended([name])
+        item = taxonomy.by_name(name)
         comment = "" if name in used else "# "
         yield from [""] if name in used else ["", "# For class_by below:"]
         yield f"{comment}[[classes]]"
-        for key in ("code", "symbol", "name", "title", "height_m", "height_sigma"):
-            if (value := getattr(item, key)) is not None:
-                yield f"{comment}{key} = {json.dumps(value, ensure_ascii=False)}"
-
-
-def _new_class(name: str, existing: Sequence[ObjectClass]) -> ObjectClass:
-    """Return a class with a code and a symbol that no existing class has."""
-    codes = {item.code for item in existing}
-    symbols = {item.symbol for item in existing}
-    code = next(code for code in range(FIRST_OWN_CODE, MAX_CODE) if code not in codes)
-    letters = name.upper() + name + SYMBOLS
-    symbol = next(letter for letter in letters if letter in SYMBOLS and letter not in symbols)
-    return ObjectClass(code, symbol, name, name.replace("_", " ").capitalize())
+        for key in ("code", "symbol", "name", "title"):
+            yield f"{comment}{key} = {json.dumps(getattr(item, key), ensure_ascii=False)}"
 
 
 def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:

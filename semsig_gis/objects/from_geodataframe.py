@@ -15,6 +15,8 @@ from semsig_gis.core import (
     CrsError,
     EmptyResultError,
     InputError,
+    Taxonomy,
+    listed,
     nearest_name,
 )
 from semsig_gis.objects.layers import assemble, choose_layers
@@ -33,6 +35,7 @@ from semsig_gis.sources import (
     has_element_columns,
     has_tag_columns,
     load_catalog,
+    paper_taxonomy,
     raw_layer,
 )
 
@@ -204,10 +207,14 @@ def _by_column(
         )
         raise InputError(
             f"column {column!r} contains {unknown[0]!r}, which is not a "
-            f"class{nearest_name(unknown[0], names)}; the classes are {', '.join(names)}; "
+            f"class{nearest_name(unknown[0], names)}; the classes are {listed(names)}; "
             f"{advice}, and rows without a class are left out."
         )
     layer = replace(layer, notes=())  # rows without a class are intended, not worth a note
+    if catalog is None:
+        more = {item if isinstance(item, str) else item.name for item in new_classes}
+        used = {item.name for item in paper_taxonomy().classes} | {*frame[column]} | more
+        taxonomy = Taxonomy(tuple(item for item in taxonomy.classes if item.name in used))
     catalog = catalog or Catalog(name="frame", title="Table", taxonomy=taxonomy, layers=(spec,))
     catalog = replace(catalog, taxonomy=taxonomy, layers=(spec,))
     objects = assemble([layer], catalog, metric_crs=metric_crs).objects

@@ -125,7 +125,7 @@ def test_extended_does_not_change_the_taxonomy() -> None:
         ),
         (TAXONOMY.encode, "DDZB", ("'Z'", "`semsig info --symbols`")),
         (TAXONOMY.encode, "Dd", ("'d'", "the nearest is 'D'")),
-        (TAXONOMY.by_code, 2, ("class code 2", "[1, 3]")),
+        (TAXONOMY.by_code, 2, ("class code 2", "1, 3")),
     ],
 )
 def test_error_names_an_unknown_class(
