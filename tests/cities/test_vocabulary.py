@@ -171,9 +171,9 @@ def test_objects_of_each_class_equal_those_of_a_plain_loop(geodata: Path, file: 
         names = classes_of(kind, tags)
         if isinstance(element, Way):
             # At the edge of a file nodes are missing: a part of an outline is enough.
-            known = [item.location.valid() for item in element.nodes]
-            names = names if all(known) else names & EXTENDED
-            names = names if any(map(all, itertools.pairwise(known))) else set()
+            validity = [item.location.valid() for item in element.nodes]
+            names = names if all(validity) else names & EXTENDED
+            names = names if any(map(all, itertools.pairwise(validity))) else set()
         for name in names:
             expected[name].add(f"{KINDS[kind]}/{element.id}")
     layers = read_layers(path, SPECS)
