@@ -353,14 +353,10 @@ class Taxonomy(Displayed):
         table.setflags(write=False)
         return table
 
-    @functools.cached_property
-    def symbol_bytes(self) -> NDArray[np.uint8]:
-        """ASCII values of the symbols of all codes, shape (256,); ``?`` for unused codes."""
-        table = np.full(MAX_CODE + 1, ord("?"), dtype=np.uint8)
-        for item in self.classes:
-            table[item.code] = ord(item.symbol if item.symbol.isascii() else "?")
-        table.setflags(write=False)
-        return table
+    @property
+    def tall_codes(self) -> NDArray[np.uint8]:
+        """Class codes of the landmarks, ascending."""
+        return np.array(sorted(item.code for item in self.classes if item.tall), np.uint8)
 
     def ranges(self, radius: float) -> NDArray[np.float64]:
         """Return the visibility range of each class code in metres, shape (256,).

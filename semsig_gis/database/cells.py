@@ -28,7 +28,7 @@ from semsig_gis.core import (
 from semsig_gis.database.city import City
 from semsig_gis.database.database import EXTENT_UNITS, SignatureDatabase
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
-from semsig_gis.database.sightings import clockwise_order, measure_sightings
+from semsig_gis.database.sightings import clockwise_order, landmark_tops, measure_sightings
 from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.viewpoints import (
     ViewpointSpec,
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     import geopandas as gpd
     from numpy.typing import NDArray
 
+    from semsig_gis.core import Taxonomy
     from semsig_gis.database.sightings import SightingPairs
     from semsig_gis.database.viewpoints import ViewpointMode
 
@@ -125,10 +126,9 @@ def build_database(
     footprints = select_elements(footprints, "buildings")
     streets = select_elements(streets, "streets")
     grid, spec = grid or GridSpec(), spec or SignatureSpec()
-    reach = float(objects.taxonomy.ranges(spec.radius).max())
     database = build_cells(
         objects,
-        *cells_near(objects.xy, grid=grid, radius=reach),
+        *cells_in_range(objects, grid=grid, spec=spec),
         grid=grid,
         spec=spec,
         viewpoints=viewpoints,
@@ -222,18 +222,20 @@ def build_cells(
     footprints: gpd.GeoDataFrame | None = None,
     streets: gpd.GeoDataFrame | None = None,
     partial: bool = False,
+    box: NDArray[np.float64] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> SignatureDatabase:
     """Compute the signatures of some cells; `objects` must include all that they can see.
 
     The cells are distinct and ordered by column and row. The result has the cells that are
     viewpoints and see an object, possibly none. If the cells are only a `partial` city, buildings
-    and streets may be empty tables. All else is as in `build_database`.
+    and streets may be empty tables, and `box` is that of the whole city (`city_box`): cells outside
+    of it that see only landmarks are left out. All else is as in `build_database`.
     """
     viewpoints = viewpoints or ViewpointSpec()
     buildings = None
     if footprints is not None and not (partial and footprints.empty):
-        buildings = Footprints(reproject(footprints, objects.crs).geometry.to_numpy())
+        buildings = Footprints.of(reproject(footprints, objects.crs))
     choice = viewpoints
     # Without a building nearby every cell is outdoor; without a street none is along one.
     surroundings = {"outdoor": footprints, "streets": streets}.get(viewpoints.mode)
@@ -259,20 +261,30 @@ def build_cells(
     if not partial:
         announce(expected * (PAIR_S if buildings is None else HIDDEN_PAIR_S), "building")
     columns, rows = columns[mask], rows[mask]
+    tops = landmark_tops(objects)
+    if tops is not None:
+        if box is None:
+            box = city_box(objects.xy, objects.taxonomy, spec.radius)
+        inside = in_box(grid.viewpoints(columns, rows), box)
     # Lengths, codes, bearings, distances and extents of each block; the first, empty block has the
     # types.
     kinds = (np.int64, np.uint8, np.uint16, np.uint8, np.uint8)
     blocks = [tuple(np.empty(0, kind) for kind in kinds)]
-    for cells, pairs in sightings_by_block(
+    for cells, sightings in sightings_by_block(
         columns,
         rows,
         objects.xy,
         grid=grid,
-        index=PackedIndex(objects.xy),
         ranges=ranges[codes],
         footprints=buildings,
         groups=objects.groups,
+        tops=tops,
     ):
+        pairs = sightings
+        if tops is not None:
+            stays = inside[cells].copy()
+            stays[pairs.viewpoint[np.isnan(tops[pairs.object])]] = True
+            pairs = pairs.take(stays[pairs.viewpoint])
         order = clockwise_order(pairs, codes)
         units = np.floor(pairs.bearing * (BEARING_UNITS / 360.0))
         extent = np.empty(0) if pairs.extent is None else pairs.extent[order]
@@ -313,6 +325,48 @@ def build_cells(
     )
 
 
+def city_box(xy: NDArray[np.float64], taxonomy: Taxonomy, radius: float) -> NDArray[np.float64]:
+    """Return the box of objects, widened by the longest range of those that are not tall.
+
+    It is ``xmin, ymin, xmax, ymax`` in metres. Cells outside of it have no landmarks.
+    """
+    margin = taxonomy.near_reach(radius)
+    return np.append(xy.min(axis=0) - margin, xy.max(axis=0) + margin)
+
+
+def in_box(xy: NDArray[np.float64], box: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return a mask of the places, shape (n, 2), in a box or on its edge."""
+    inside: NDArray[np.bool_] = np.logical_and.reduce((xy >= box[:2]) & (xy <= box[2:]), axis=1)
+    return inside
+
+
+def cells_in_range(
+    objects: StreetObjects,
+    *,
+    grid: GridSpec,
+    spec: SignatureSpec,
+    box: NDArray[np.float64] | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the columns and rows of the cells that may see an object, ordered by column and row.
+
+    Those that see only landmarks are in `box`, by default that of the objects (`city_box`).
+    """
+    xy, taxonomy = objects.xy, objects.taxonomy
+    tall = np.isin(objects.codes, taxonomy.tall_codes)
+    reach = taxonomy.near_reach(spec.radius)
+    if not tall.any():
+        return cells_near(xy, grid=grid, radius=reach)
+    if box is None:
+        box = city_box(xy, taxonomy, spec.radius)
+    furthest = float(taxonomy.ranges(spec.radius)[objects.codes[tall]].max())
+    columns, rows = cells_near(xy[tall], grid=grid, radius=furthest)
+    inside = in_box(grid.viewpoints(columns, rows), box)
+    ids = cell_ids(columns[inside], rows[inside])
+    if not tall.all():
+        ids = np.union1d(ids, cell_ids(*cells_near(xy[~tall], grid=grid, radius=reach)))
+    return split_ids(ids)
+
+
 def expected_pairs(
     ranges: NDArray[np.float64], *, grid: GridSpec, cells: int, share: float = 1.0
 ) -> float:
@@ -321,8 +375,8 @@ def expected_pairs(
     `ranges` are the visibility ranges of the objects in metres, `share` is the share of the cells
     around them that are viewpoints.
     """
-    in_range = math.pi * float(((ranges / grid.step) ** 2).sum())
-    return min(in_range * share, float(cells) * len(ranges))
+    in_range = math.pi * share * (ranges / grid.step) ** 2
+    return float(np.minimum(in_range, float(cells)).sum())
 
 
 def require_room(pairs: float, *, cells: int, objects: int, processes: int = 1) -> None:
@@ -348,18 +402,21 @@ def sightings_by_block(
     objects: NDArray[np.float64],
     *,
     grid: GridSpec,
-    index: PackedIndex,
     ranges: NDArray[np.float64],
     footprints: Footprints | None = None,
     groups: NDArray[np.int32] | None = None,
+    tops: NDArray[np.float64] | None = None,
 ) -> Iterator[tuple[slice, SightingPairs]]:
     """Yield the sightings from the centres of grid cells, block by block.
 
-    The cells are distinct and ordered by column and row. `index` is an R-tree over `objects`,
-    positions in metres; `ranges` and `groups` are as in `measure_sightings`. Each block is a slice
-    of the cells and their sightings in any order, with viewpoints counted from the first cell of
-    the slice.
+    The cells are distinct and ordered by column and row. `objects` are positions in metres;
+    `ranges`, `groups` and `tops` are as in `measure_sightings`. Each block is a slice of the cells
+    and their sightings in any order, with viewpoints counted from the first cell of the slice.
     """
+    # Landmarks are few, and their range is long, so that they are searched apart.
+    tall = np.zeros(len(objects), np.bool_) if tops is None else ~np.isnan(tops)
+    parts = [np.flatnonzero(part) for part in (~tall, tall) if part.any()]
+    indexes = [PackedIndex(objects[part]) for part in parts]
     starts = range(0, len(columns), CELLS_PER_BLOCK)
     blocks = [
         slice(start, min(start + CELLS_PER_BLOCK, len(columns))) for start in reversed(starts)
@@ -367,7 +424,12 @@ def sightings_by_block(
     while blocks:
         block = blocks.pop()
         cells = columns[block], rows[block]
-        item, first, size = _cell_runs(*cells, objects, grid=grid, index=index, ranges=ranges)
+        runs = [
+            _cell_runs(*cells, objects[part], grid=grid, index=index, ranges=ranges[part])
+            for part, index in zip(parts, indexes, strict=True)
+        ]
+        item = np.concatenate([part[run[0]] for part, run in zip(parts, runs, strict=True)])
+        first, size = (np.concatenate([run[number] for run in runs]) for number in (1, 2))
         # Blocks with very many pairs are halved.
         if size.sum() > PAIRS_PER_BLOCK and block.stop - block.start > 1:
             middle = (block.start + block.stop) // 2
@@ -378,7 +440,13 @@ def sightings_by_block(
         yield (
             block,
             measure_sightings(
-                *pairs, centres, objects, ranges=ranges, footprints=footprints, groups=groups
+                *pairs,
+                centres,
+                objects,
+                ranges=ranges,
+                footprints=footprints,
+                groups=groups,
+                tops=tops,
             ),
         )
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import lazy_loader
 import numpy as np
 
-from semsig_gis.core import Displayed, InputError
+from semsig_gis.core import HEIGHT, Displayed, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,11 +23,15 @@ else:
     shapely = lazy_loader.load("shapely")
 
 TOLERANCE_M = 0.5
+EYE_M = 1.6  # above the ground
+SHADOW_M = 150.0
+"""Distance within which a building may hide a landmark."""
 GAP_M = 0.05  # buildings nearer to each other than twice this are joined
 TOUCHING_M = 1.0  # more than the tolerance, and than a gap between joined buildings
 # Added to a range: more than rounding errors, the tolerance and the gap between joined buildings.
 MARGIN_M = 2.0
 PAIRS_PER_BLOCK = 1 << 17
+TINY = 1e-9
 POLYGON_DIMENSIONS = 2
 
 
@@ -41,11 +45,15 @@ class Footprints(Displayed):
         are left out, invalid ones repaired.
     tolerance : float, default 0.5
         Depth in metres to which a sight line may enter buildings without being blocked.
+    heights : array_like of float, optional
+        Height of each building in metres, NaN if unknown.
 
     Attributes
     ----------
     repaired : int
         Number of invalid footprints that were repaired.
+    roofs : Roofs or None
+        The buildings of known height, which may hide landmarks; None if there are none.
 
     Raises
     ------
@@ -65,14 +73,21 @@ class Footprints(Displayed):
         polygons: NDArray[np.object_] | Sequence[shapely.Geometry | None],
         *,
         tolerance: float = TOLERANCE_M,
+        heights: NDArray[np.floating] | None = None,
     ) -> None:
         if not (math.isfinite(tolerance) and tolerance >= 0):
             raise InputError(f"tolerance is {tolerance} m; give a number of metres from 0 up.")
         self.tolerance = float(tolerance)
         self._cores: dict[int, NDArray[np.object_]] = {}
-        self._polygons, self.repaired = _usable(np.asarray(polygons, dtype=object).reshape(-1))
+        self._polygons, row, self.repaired = _usable(np.asarray(polygons, dtype=object).reshape(-1))
         if len(self._polygons) == 0:
             raise InputError("no building footprint encloses an area; give polygons.")
+        self.roofs = None if heights is None else Roofs.of(self._polygons, heights[row])
+
+    @classmethod
+    def of(cls, buildings: gpd.GeoDataFrame) -> Footprints:
+        """Return the footprints of a table in a metric CRS, with their heights if it has them."""
+        return cls(buildings.geometry.to_numpy(), heights=building_heights(buildings))
 
     def __len__(self) -> int:  # noqa: D105
         return len(self._polygons)
@@ -189,6 +204,95 @@ def hidden(
     return blocked
 
 
+class Roofs:
+    """Buildings of known height, which hide landmarks that are lower against the sky.
+
+    `polygons` are valid, and `heights` are in metres above the ground.
+    """
+
+    def __init__(self, polygons: NDArray[np.object_], heights: NDArray[np.float64]) -> None:
+        self._polygons, self._heights = polygons, heights
+        self._bounds = shapely.bounds(polygons).reshape(-1, 4)
+        shapely.prepare(polygons)
+
+    @classmethod
+    def of(cls, polygons: NDArray[np.object_], heights: NDArray[np.floating]) -> Roofs | None:
+        """Return the roofs above the eye of a person, None without any; heights may be NaN."""
+        high = heights > EYE_M
+        return cls(polygons[high], heights[high].astype(np.float64)) if high.any() else None
+
+    def hide(
+        self,
+        viewpoints: NDArray[np.float64],
+        landmarks: NDArray[np.float64],
+        tops: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Return a mask of the landmarks that a building hides from their viewpoint.
+
+        Rows of `viewpoints` and `landmarks`, shape (p, 2), are the ends of sight lines in metres,
+        `tops` the heights of the landmarks, infinite if unknown. A building hides a landmark if it
+        is within `SHADOW_M` on the line, its roof is higher above the horizon than the top, and it
+        contains neither the viewpoint nor the landmark.
+        """
+        blocked = np.zeros(len(viewpoints), bool)
+        away = np.hypot(*(landmarks - viewpoints).T)
+        usable = np.flatnonzero((away > 0) & np.isfinite(tops))
+        for first in range(0, len(usable), PAIRS_PER_BLOCK):  # to bound the memory
+            part = usable[first : first + PAIRS_PER_BLOCK]
+            blocked[part] = self._hide(viewpoints[part], landmarks[part], tops[part], away[part])
+        return blocked
+
+    def _hide(
+        self,
+        starts: NDArray[np.float64],
+        ends: NDArray[np.float64],
+        tops: NDArray[np.float64],
+        away: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        steps = (ends - starts) / away[:, None]
+        slopes = np.maximum((tops - EYE_M) / away, TINY)
+        # A building of height h hides if the line meets it within (h - eye) / slope.
+        here = self._near(starts)
+        highest = self._heights[here].max(initial=EYE_M)
+        limits = np.minimum(np.minimum(away, SHADOW_M), (highest - EYE_M) / slopes)
+        lines = _lines(starts, steps, limits)
+        hit, line = shapely.STRtree(lines).query(self._polygons[here], predicate="intersects")
+        roof = here[hit]
+        near = np.minimum(limits[line], (self._heights[roof] - EYE_M) / slopes[line])
+        polygons = self._polygons[roof]
+        hides = shapely.intersects(polygons, _lines(starts[line], steps[line], near))
+        hides &= ~shapely.intersects_xy(polygons, *starts[line].T)
+        roof, line = roof[hides], line[hides]
+        own = shapely.dwithin(self._polygons[roof], shapely.points(ends[line]), TOUCHING_M)
+        blocked = np.zeros(len(starts), bool)
+        blocked[line[~own]] = True
+        return blocked
+
+    def _near(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the roofs in the box of some places, widened by `SHADOW_M`."""
+        west, south, east, north = self._bounds.T
+        low, high = places.min(axis=0) - SHADOW_M, places.max(axis=0) + SHADOW_M
+        return np.flatnonzero(
+            (east >= low[0]) & (west <= high[0]) & (north >= low[1]) & (south <= high[1])
+        )
+
+
+def _lines(
+    starts: NDArray[np.float64], steps: NDArray[np.float64], lengths: NDArray[np.float64]
+) -> NDArray[np.object_]:
+    """Return lines of some lengths in directions of unit vectors."""
+    ends = starts + steps * lengths[:, None]
+    return np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
+
+
+def building_heights(buildings: gpd.GeoDataFrame) -> NDArray[np.float64] | None:
+    """Return the heights of buildings in metres, NaN if unknown; None without such a column."""
+    if HEIGHT not in buildings:
+        return None
+    heights: NDArray[np.float64] = buildings[HEIGHT].to_numpy(np.float64, na_value=math.nan)
+    return heights
+
+
 def _pairs_near(
     starts: NDArray[np.float64], ends: NDArray[np.float64], interiors: NDArray[np.object_]
 ) -> NDArray[np.int64]:
@@ -206,9 +310,12 @@ def _pairs_near(
     return np.flatnonzero(near[np.cumsum(first) - 1])
 
 
-def _usable(shapes: NDArray[np.object_]) -> tuple[NDArray[np.object_], int]:
-    """Return valid polygons with an area, and the number of repaired ones."""
-    polygons = shapes[~(shapely.is_missing(shapes) | shapely.is_empty(shapes))]
+def _usable(
+    shapes: NDArray[np.object_],
+) -> tuple[NDArray[np.object_], NDArray[np.int64], int]:
+    """Return valid polygons with an area, the row of each, and the number of repaired ones."""
+    rows = np.flatnonzero(~(shapely.is_missing(shapes) | shapely.is_empty(shapes)))
+    polygons = shapes[rows]
     wrong = np.flatnonzero(
         ~np.isin(
             shapely.get_type_id(polygons),
@@ -230,8 +337,10 @@ def _usable(shapes: NDArray[np.object_]) -> tuple[NDArray[np.object_], int]:
     invalid = ~shapely.is_valid(polygons)
     polygons[invalid] = shapely.make_valid(polygons[invalid])
     # A repaired polygon may be a collection of polygons and lines, even a nested one.
-    parts = shapely.get_parts(shapely.get_parts(polygons))
-    return parts[shapely.area(parts) > 0], int(invalid.sum())
+    parts, own = shapely.get_parts(polygons, return_index=True)
+    parts, part = shapely.get_parts(parts, return_index=True)
+    flat = shapely.area(parts) == 0
+    return parts[~flat], rows[own[part[~flat]]], int(invalid.sum())
 
 
 def _polygons_of(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
@@ -261,11 +370,19 @@ def _component_labels(
 class NearbyFootprints:
     """The footprints around places in a city, each prepared when a place near it is asked for.
 
-    `polygons` are the footprints of the city in a metric CRS.
+    `polygons` are the footprints of the city in a metric CRS, and `heights` theirs in metres, NaN
+    if unknown.
     """
 
-    def __init__(self, polygons: NDArray[np.object_]) -> None:
-        self._polygons = polygons[~_flat(polygons)]
+    def __init__(
+        self, polygons: NDArray[np.object_], heights: NDArray[np.float64] | None = None
+    ) -> None:
+        solid = ~_flat(polygons)
+        self._polygons = polygons[solid]
+        self._roofs = None
+        if heights is not None and len(self._polygons):
+            shapes, row, _ = _usable(self._polygons.copy())
+            self._roofs = Roofs.of(shapes, heights[solid][row])
         self._tree = shapely.STRtree(self._polygons)
         self._ready = np.zeros(len(self._polygons), bool)
         self._footprints: Footprints | None = None
@@ -274,15 +391,19 @@ class NearbyFootprints:
     def around(self, places: NDArray[np.float64], *, distance: float) -> Footprints | None:
         """Return at least the footprints within `distance` metres of places, shape (p, 2).
 
-        None if there are none. Those joined to them are included.
+        None if there are none. Those joined to them are included, and all roofs of the city.
         """
-        rows = self._tree.query(shapely.points(places), predicate="dwithin", distance=distance)[1]
+        points = np.asarray(shapely.points(places))
+        rows = self._tree.query(points, predicate="dwithin", distance=distance)[1]
+        if not len(rows) and self._roofs is not None:
+            rows = self._tree.query_nearest(points[:1])[1]  # any building, to have the roofs
         if not len(rows):
             return None
         with self._lock:
             new = _with_joined(self._tree, self._polygons, rows[~self._ready[rows]])
             if len(new):
                 more = Footprints(self._polygons[new])
+                more.roofs = self._roofs
                 ready = self._footprints
                 self._footprints = more if ready is None else ready.joined(more)
                 self._ready[new] = True

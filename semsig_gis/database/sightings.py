@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core import FULL_TURN, signed_degrees
+from semsig_gis.core import FULL_TURN, PackedIndex, signed_degrees
 from semsig_gis.database.occlusion import hidden
 
 if TYPE_CHECKING:
@@ -69,12 +69,14 @@ def measure_sightings(
     ranges: NDArray[np.float64],
     footprints: Footprints | None = None,
     groups: NDArray[np.int32] | None = None,
+    tops: NDArray[np.float64] | None = None,
 ) -> SightingPairs:
     """Return the pairs that are within range and not hidden by a building, with measures.
 
     A pair is a row of `viewpoints` and a row of `objects`, positions in metres; `ranges` is the
     visibility range of each object in metres. `groups` is the extended thing that each object is a
-    point of, -1 for none: of these, only the nearest visible point is returned.
+    point of, -1 for none: of these, only the nearest visible point is returned. `tops` is as in
+    `landmark_tops`: landmarks are hidden only by roofs of known height.
     """
     dx = objects[:, 0][item] - viewpoints[:, 0][viewpoint]
     dy = objects[:, 1][item] - viewpoints[:, 1][viewpoint]
@@ -87,10 +89,43 @@ def measure_sightings(
     if footprints is not None:
         # `hidden` is fastest if the pairs of a viewpoint follow each other.
         pairs = pairs.take(np.argsort(pairs.viewpoint, kind="stable"))
-        pairs = pairs.take(
-            ~hidden(viewpoints[pairs.viewpoint], objects[pairs.object], footprints=footprints)
-        )
+        pairs = pairs.take(~_hidden(pairs, viewpoints, objects, footprints, tops))
     return pairs if groups is None else _nearest_points(pairs, groups)
+
+
+def _hidden(
+    pairs: SightingPairs,
+    viewpoints: NDArray[np.float64],
+    objects: NDArray[np.float64],
+    footprints: Footprints,
+    tops: NDArray[np.float64] | None,
+) -> NDArray[np.bool_]:
+    """Return a mask of the pairs that a building hides."""
+    starts, ends = viewpoints[pairs.viewpoint], objects[pairs.object]
+    if tops is None:
+        return hidden(starts, ends, footprints=footprints)
+    heights = tops[pairs.object]
+    mask, far = np.zeros(len(starts), np.bool_), ~np.isnan(heights)
+    mask[~far] = hidden(starts[~far], ends[~far], footprints=footprints)
+    if footprints.roofs is not None:
+        mask[far] = footprints.roofs.hide(starts[far], ends[far], heights[far])
+    return mask
+
+
+def landmark_tops(objects: StreetObjects) -> NDArray[np.float64] | None:
+    """Return the height of the top of each landmark in metres, shape (n,); None without landmarks.
+
+    It is infinite if it is unknown, and NaN for objects that are not tall.
+    """
+    tall = np.isin(objects.codes, objects.taxonomy.tall_codes)
+    if not tall.any():
+        return None
+    tops = np.full(len(tall), math.nan)
+    tops[tall] = math.inf
+    if objects.heights is not None:
+        stated = tall & (objects.heights > 0)
+        tops[stated] = objects.heights[stated]
+    return tops
 
 
 def _nearest_points(pairs: SightingPairs, groups: NDArray[np.int32]) -> SightingPairs:
@@ -193,11 +228,27 @@ def visible_objects_at(
     without a range of their own. Objects that `footprints` hide are left out.
     """
     codes, xy = objects.codes, objects.xy
-    ranges = objects.taxonomy.ranges(radius)[codes]
+    ranges, tops = objects.taxonomy.ranges(radius)[codes], landmark_tops(objects)
     places = np.ascontiguousarray(places, dtype=np.float64)
-    candidates = index.pairs_within(places, radius=float(ranges.max()))
+    if tops is None:
+        viewpoint, item = index.pairs_within(places, radius=float(ranges.max()))
+    else:
+        # There are few landmarks, but very many other objects are in range of one.
+        near, tall = np.isnan(tops), np.flatnonzero(~np.isnan(tops))
+        viewpoint, item = index.pairs_within(places, radius=float(ranges[near].max(initial=0.0)))
+        viewpoint, item = viewpoint[near[item]], item[near[item]]
+        further = PackedIndex(xy[tall]).pairs_within(places, radius=float(ranges[tall].max()))
+        viewpoint = np.concatenate([viewpoint, further[0]])
+        item = np.concatenate([item, tall[further[1]]])
     pairs = measure_sightings(
-        *candidates, places, xy, ranges=ranges, footprints=footprints, groups=objects.groups
+        viewpoint,
+        item,
+        places,
+        xy,
+        ranges=ranges,
+        footprints=footprints,
+        groups=objects.groups,
+        tops=tops,
     )
     order = clockwise_order(pairs, codes)
     lengths = np.bincount(pairs.viewpoint, minlength=len(places))

@@ -21,6 +21,7 @@ import numpy as np
 from semsig_gis import __version__
 from semsig_gis.core import (
     HALF_WIDTH,
+    HEIGHT,
     LICENSES,
     NAME,
     DatabaseError,
@@ -39,7 +40,7 @@ from semsig_gis.database.file import (
     require_file,
     save_database,
 )
-from semsig_gis.database.occlusion import TOLERANCE_M, NearbyFootprints
+from semsig_gis.database.occlusion import TOLERANCE_M, NearbyFootprints, building_heights
 from semsig_gis.database.place_names import FAR_M, PlaceNames
 from semsig_gis.database.viewpoints import reproject, select_elements
 from semsig_gis.objects import licenses_of, open_objects, save_objects
@@ -133,7 +134,7 @@ class ObjectStore(Displayed):
         lines = select_elements(streets, "streets")
         return cls(
             objects=objects,
-            footprints=None if houses is None else _stored(houses, objects.crs, NAME),
+            footprints=None if houses is None else _stored(houses, objects.crs, NAME, HEIGHT),
             streets=None if lines is None else _stored(lines, objects.crs, HALF_WIDTH, NAME),
         )
 
@@ -176,8 +177,12 @@ class ObjectStore(Displayed):
 
     @cached_property
     def _buildings(self) -> NearbyFootprints:
-        shapes = None if self.footprints is None else self.footprints.geometry.to_numpy()
-        return NearbyFootprints(np.empty(0, object) if shapes is None else shapes)
+        if self.footprints is None:
+            return NearbyFootprints(np.empty(0, object))
+        # Heights matter only to landmarks.
+        has_landmarks = bool(len(self.objects.taxonomy.tall_codes))
+        heights = building_heights(self.footprints) if has_landmarks else None
+        return NearbyFootprints(self.footprints.geometry.to_numpy(), heights)
 
     def buildings_around(
         self,

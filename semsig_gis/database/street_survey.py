@@ -165,7 +165,7 @@ def survey(
     objects = loaded.objects
     buildings = None
     if loaded.buildings is not None and not loaded.buildings.empty:
-        buildings = Footprints(reproject(loaded.buildings, objects.crs).geometry.to_numpy())
+        buildings = Footprints.of(reproject(loaded.buildings, objects.crs))
     streets = np.empty(0, object)
     if loaded.streets is not None:
         streets = _lines(reproject(loaded.streets, objects.crs).geometry.to_numpy(), area)

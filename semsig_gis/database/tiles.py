@@ -6,10 +6,11 @@ are finished, the folder is renamed to ``OUT``.
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +29,6 @@ from semsig_gis.core import (
     SignatureSpec,
     announce,
     cell_ids,
-    cells_near,
     check_workers,
     consecutive,
     finish_tasks,
@@ -40,6 +40,8 @@ from semsig_gis.database.cells import (
     HIDDEN_PAIR_S,
     PAIR_S,
     build_cells,
+    cells_in_range,
+    city_box,
     expected_pairs,
     require_room,
 )
@@ -54,7 +56,7 @@ from semsig_gis.database.file import (
     read_manifest,
     save_database,
 )
-from semsig_gis.database.occlusion import MARGIN_M, TOLERANCE_M, footprints_around
+from semsig_gis.database.occlusion import MARGIN_M, SHADOW_M, TOLERANCE_M, footprints_around
 from semsig_gis.database.tile_inputs import (
     copy_with_bounds,
     fingerprint,
@@ -80,8 +82,10 @@ if TYPE_CHECKING:
     import geopandas as gpd
     from numpy.typing import NDArray
 
+    from semsig_gis.core import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.tile_inputs import Input
+    from semsig_gis.objects import StreetObjects
 
     Tile = tuple[int, int]
     Box = tuple[float, float, float, float]
@@ -253,7 +257,8 @@ def build_parts(
     """
     copies = copies or {}
     try:
-        tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
+        tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.near_reach)
+        tiles += _landmark_tiles(plan, tiles)
         others = [tile for tile in tiles if tile not in copies]
         results: dict[Tile, PartFile | None] = {**copies, **finished_tiles(plan.folder, others)}
         missing = [tile for tile in others if tile not in results]
@@ -308,13 +313,14 @@ def _check_resources(
     """
     if not missing:
         return
-    objects = open_objects(plan.objects, box=plan.box(tiles[0], plan.reach + MARGIN_M))
+    objects = _objects_around(plan, tiles[0])
     ranges = objects.taxonomy.ranges(plan.spec.radius)[objects.codes]
     cells = plan.side**2
     pairs = expected_pairs(ranges, grid=plan.grid, cells=cells)
     if scheduler is None:
         # Most of a large tile may be far from any object.
-        near = min(cells, round(len(objects) * (2.0 * plan.reach / plan.grid.step + 2.0) ** 2))
+        furthest = ranges.max(initial=0.0)
+        near = min(cells, round(len(objects) * (2.0 * furthest / plan.grid.step + 2.0) ** 2))
         require_room(pairs, cells=near, objects=len(objects), processes=max(workers, 1))
     if len(objects):
         pair_s = PAIR_S if plan.buildings is None else HIDDEN_PAIR_S
@@ -328,8 +334,9 @@ class TilePlan:
     """Paths and specs for building any tile; small, because it is sent to the workers.
 
     Part files are written to `folder`; all inputs can be read by box and are in one CRS. `side` is
-    the side of a tile in cells; `reach` is the largest visibility range of any class and
-    `street_reach` the largest half-width of a street, both in metres.
+    the side of a tile in cells; `reach` is the largest visibility range of any class, `near_reach`
+    that of classes that are not tall, and `street_reach` the largest half-width of a street, all in
+    metres. `city` is the box of all objects (`city_box`), None without landmarks.
     """
 
     folder: Path
@@ -341,7 +348,9 @@ class TilePlan:
     viewpoints: ViewpointSpec
     side: int
     reach: float
+    near_reach: float
     street_reach: float = 0.0
+    city: Box | None = None
 
     def box(self, tile: Tile, margin: float) -> Box:
         """Return ``xmin, ymin, xmax, ymax`` of a tile, widened by `margin` metres on each side."""
@@ -376,7 +385,8 @@ def plan_tiles(
     }
     paths = {name: Path(path).absolute() for name, path in inputs.items() if path is not None}
     empty = open_objects(paths["objects"], box=EMPTY_BOX)
-    reach = float(empty.taxonomy.ranges(spec.radius).max())
+    taxonomy = empty.taxonomy
+    reach = float(taxonomy.ranges(spec.radius).max())
     require_step(grid, reach)
     require_surroundings(viewpoints, paths.get("buildings"), paths.get("streets"))
     recipe: dict[str, Any] = {
@@ -405,6 +415,8 @@ def plan_tiles(
             viewpoints=viewpoints,
             side=tile.cells(grid),
             reach=reach,
+            near_reach=taxonomy.near_reach(spec.radius),
+            city=_city_of(files["objects"], taxonomy, spec.radius),
             street_reach=0.0 if lines is None else max(viewpoints.width, widest_street(lines)),
         )
     except BaseException:
@@ -412,11 +424,52 @@ def plan_tiles(
         raise
 
 
+def _city_of(path: Path, taxonomy: Taxonomy, radius: float) -> Box | None:
+    """Return the box of all objects in a file, widened as by `city_box`; None without landmarks."""
+    if not len(taxonomy.tall_codes):
+        return None
+    xmin, ymin, xmax, ymax = city_box(open_objects(path).xy, taxonomy, radius).tolist()
+    return xmin, ymin, xmax, ymax
+
+
+def _landmark_tiles(plan: TilePlan, tiles: Sequence[Tile]) -> list[Tile]:
+    """Return the further tiles with cells in range of a landmark, ordered by column and row."""
+    if plan.city is None:
+        return []
+    objects = open_objects(plan.objects)
+    tall = np.isin(objects.codes, objects.taxonomy.tall_codes)
+    side = plan.side * plan.grid.step
+    low, high = np.array(plan.city).reshape(2, 2)
+    further: set[Tile] = set()
+    for place in objects.xy[tall]:
+        corners = np.clip([place - plan.reach, place + plan.reach], low, high)
+        first, last = np.floor((corners - plan.grid.origin) / side).astype(np.int64).tolist()
+        columns, rows = (range(first[axis], last[axis] + 1) for axis in (0, 1))
+        further.update(itertools.product(columns, rows))
+        if len(further) > MOST_TILES:
+            raise InputError(
+                f"tiles of {side:g} m would be more than {MOST_TILES:,}; make them larger."
+            )
+    return sorted(further.difference(tiles))
+
+
+def _objects_around(plan: TilePlan, tile: Tile) -> StreetObjects:
+    """Return the objects that the cells of a tile may see."""
+    objects = open_objects(plan.objects, box=plan.box(tile, plan.reach + MARGIN_M))
+    if plan.city is None:
+        return objects
+    west, south, east, north = plan.box(tile, plan.near_reach + MARGIN_M)
+    x, y = objects.xy.T
+    near = (x >= west) & (x <= east) & (y >= south) & (y <= north)
+    near |= np.isin(objects.codes, objects.taxonomy.tall_codes)
+    return replace(objects, table=objects.table[near])
+
+
 def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) -> list[Tile]:
     """Return the tiles in range of an object, by decreasing number of objects.
 
     Only the bounds in the file of objects are read. `side` is the side of a tile in cells, `reach`
-    the largest visibility range of any class in metres. InputError if the tiles are too small.
+    a visibility range in metres. InputError if the tiles are too small.
     """
     metres = side * grid.step
     if reach > MOST_TILES_IN_RANGE * metres:
@@ -464,12 +517,12 @@ def tile_cells(
     """
     if not plan.folder.is_dir():
         raise InputError(f"{plan.folder} no longer exists; run the same command again.")
-    around = plan.box(tile, plan.reach + MARGIN_M)
-    objects = open_objects(plan.objects, box=around)
+    objects = _objects_around(plan, tile)
     if not len(objects):
         return None
+    city = None if plan.city is None else np.array(plan.city)
     if only is None:
-        columns, rows = cells_near(objects.xy, grid=plan.grid, radius=plan.reach)
+        columns, rows = cells_in_range(objects, grid=plan.grid, spec=plan.spec, box=city)
         inside = (columns // plan.side == tile[0]) & (rows // plan.side == tile[1])
         columns, rows = columns[inside], rows[inside]
     else:
@@ -477,6 +530,9 @@ def tile_cells(
     read = partial(read_surroundings, crs=objects.crs)
     footprints = streets = None
     if plan.buildings is not None:
+        # Roofs farther away than other objects may hide a landmark.
+        hiding = plan.near_reach if city is None else max(plan.near_reach, SHADOW_M)
+        around = plan.box(tile, hiding + MARGIN_M)
         footprints = footprints_around(
             lambda box: read(plan.buildings, role="buildings", box=box), around
         )
@@ -493,6 +549,7 @@ def tile_cells(
         footprints=footprints,
         streets=streets,
         partial=True,
+        box=city,
     )
 
 

@@ -27,7 +27,7 @@ from semsig_gis.core import (
     percent,
     split_ids,
 )
-from semsig_gis.database.cells import build_cells
+from semsig_gis.database.cells import build_cells, city_box, in_box
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import (
     ENTRY_ARRAYS,
@@ -44,7 +44,7 @@ from semsig_gis.database.file import (
     read_manifest,
 )
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
-from semsig_gis.database.sightings import measure_sightings
+from semsig_gis.database.sightings import landmark_tops, measure_sightings
 from semsig_gis.database.store import save_with_store, stored_inputs
 from semsig_gis.database.tile_inputs import working_folder
 from semsig_gis.database.tiles import (
@@ -280,6 +280,7 @@ def update_database(
             f"database ({database.reach:g} m), which affects every cell; build the database again."
         )
     change = _find_change(new, store.objects, merged, other_layers=other_layers, notes=notes)
+    _require_same_scale(database, new)
     after = replace(store, objects=merged)
     stale = np.isin(database.cell_ids, change.cell_ids)
     recomputed = _recompute(new, after, change, progress=progress)
@@ -369,6 +370,7 @@ def update_tiles(
             f"the longest visibility range of {objects} is {after.reach:g} m and that of {path} "
             f"{before.reach:g} m, which affects every cell; build the database again."
         )
+    _require_same_scale(before, after)
     ranged = replace(after, taxonomy=merged.taxonomy)
     change = _find_change(ranged, old, merged, other_layers=other_layers, notes=notes)
     side = int(manifest.recipe["tile"]["cells"])
@@ -416,15 +418,27 @@ def update_tiles(
     return change.report(manifest.cells, sum(part.cells for part in parts), drift)
 
 
+def _require_same_scale(before: SignatureDatabase, after: SignatureDatabase) -> None:
+    """Raise InputError if the first landmarks come, or the last go, which changes all distances."""
+    if before.scale.logarithmic != after.scale.logarithmic:
+        change = "are the first landmarks" if after.scale.logarithmic else "leave no landmarks"
+        raise InputError(
+            f"the new objects {change} of the database, which affects the distances of every cell; "
+            "build the database again."
+        )
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Change:
     """The difference between the objects of a database and the new objects.
 
-    `places`, shape (c, 2) in metres, are the positions of removed and added objects; `cell_ids`,
-    ascending, are the cells in range of one. The other fields are as in `UpdateReport`.
+    `places`, shape (c, 2) in metres, are the positions of removed and added objects that are not
+    landmarks; `cell_ids`, ascending, are the cells in range of one or of a changed landmark. `box`
+    is that of the new objects. The other fields are as in `UpdateReport`.
     """
 
     places: NDArray[np.float64]
+    box: NDArray[np.float64]
     cell_ids: NDArray[np.int64]
     classes: tuple[ClassChange, ...]
     replaced: tuple[str, ...]
@@ -457,27 +471,84 @@ def _find_change(
 ) -> _Change:
     """Compare objects, and find the cells in range of a change; ranges are of the `database`."""
     changes = compare_objects(old, new)
-    old_rows, new_rows = changes.obsolete_rows, changes.new_rows
+    other = _other_sights(old, new, changes.same)
+    old_rows = np.concatenate([changes.obsolete_rows, other[:, 0]])
+    new_rows = np.concatenate([changes.new_rows, other[:, 1]])
     places = np.concatenate([old.xy[old_rows], new.xy[new_rows]])
-    ids = np.empty(0, np.int64)
-    if len(places):
-        codes = np.concatenate([old.codes[old_rows], new.codes[new_rows]])
-        ranges = database.taxonomy.ranges(database.spec.radius)[codes]
-        reach = float(ranges.max())
-        columns, rows = cells_near(places, grid=database.grid, radius=reach)
-        viewpoints = database.grid.viewpoints(columns, rows)
-        pairs = PackedIndex(places).pairs_within(viewpoints, radius=reach)
-        near = np.unique(measure_sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
-        ids = cell_ids(columns[near], rows[near])
+    codes = np.concatenate([old.codes[old_rows], new.codes[new_rows]])
+    tall = np.isin(codes, database.taxonomy.tall_codes)
+    boxes = [city_box(part.xy, database.taxonomy, database.spec.radius) for part in (old, new)]
+    ids = np.union1d(
+        _ids_in_range(database, places[~tall], codes[~tall]),
+        _ids_in_range(database, places[tall], codes[tall]),
+    )
+    if len(database.taxonomy.tall_codes) and (boxes[0] != boxes[1]).any():
+        ids = np.union1d(ids, _ids_between(database, (old, new), boxes))
     layers = {*old.table[SOURCE].unique(), *new.table[SOURCE].unique()}
     return _Change(
-        places=places,
+        places=places[~tall],
+        box=boxes[1],
         cell_ids=ids,
         classes=changes.classes,
         replaced=tuple(sorted(layers - {*other_layers})),
         kept=other_layers,
         notes=notes,
     )
+
+
+def _other_sights(
+    old: StreetObjects, new: StreetObjects, same: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return the pairs of equal objects that are seen in another way now, shape (c, 2).
+
+    They belong to a thing with other points, or are landmarks of another height.
+    """
+    other = np.zeros(len(same), np.bool_)
+    parts = [
+        np.full(len(objects), -1) if objects.groups is None else objects.groups
+        for objects in (old, new)
+    ]
+    # Equal things have equal numbers if the first of their points numbers them.
+    numbers = []
+    for groups, rows in zip(parts, same.T, strict=True):
+        _, first, thing = np.unique(groups[rows], return_index=True, return_inverse=True)
+        numbers.append(np.where(groups[rows] < 0, -1, first[thing]))
+    other |= numbers[0] != numbers[1]
+    tops = [landmark_tops(objects) for objects in (old, new)]
+    if tops[0] is not None and tops[1] is not None:
+        before, after = tops[0][same[:, 0]], tops[1][same[:, 1]]
+        other |= ~np.isnan(before) & (before != after)
+    return same[other]
+
+
+def _ids_in_range(
+    database: SignatureDatabase, places: NDArray[np.float64], codes: NDArray[np.uint8]
+) -> NDArray[np.int64]:
+    """Return the ids of the cells in range of objects, ascending."""
+    if not len(places):
+        return np.empty(0, np.int64)
+    ranges = database.taxonomy.ranges(database.spec.radius)[codes]
+    reach = float(ranges.max())
+    columns, rows = cells_near(places, grid=database.grid, radius=reach)
+    viewpoints = database.grid.viewpoints(columns, rows)
+    pairs = PackedIndex(places).pairs_within(viewpoints, radius=reach)
+    near = np.unique(measure_sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
+    return cell_ids(columns[near], rows[near])
+
+
+def _ids_between(
+    database: SignatureDatabase,
+    parts: tuple[StreetObjects, StreetObjects],
+    boxes: list[NDArray[np.float64]],
+) -> NDArray[np.int64]:
+    """Return the ids of the cells in range of a landmark that are in only one of two boxes."""
+    found = []
+    for objects in parts:
+        tall = np.isin(objects.codes, database.taxonomy.tall_codes)
+        ids = _ids_in_range(database, objects.xy[tall], objects.codes[tall])
+        inside = [in_box(database.grid.viewpoints(*split_ids(ids)), box) for box in boxes]
+        found.append(ids[inside[0] != inside[1]])
+    return np.union1d(*found)
 
 
 def _hiding(database: SignatureDatabase, store: ObjectStore) -> gpd.GeoDataFrame | None:
@@ -493,17 +564,22 @@ def _recompute(
     progress: Callable[[int, int], None] | None,
 ) -> SignatureDatabase:
     """Return the cells in range of a change, computed from the objects of a store."""
-    # A viewpoint is at most the reach from a change, and its objects are that far from it again.
-    around = 2.0 * database.reach + TOUCHING_M
-    near = np.unique(store.index.pairs_within(change.places, radius=around)[1])
-    if len(near) == 0:
+    if not len(change.cell_ids):
         return database.select(slice(0))
-    footprints = _hiding(database, store)
-    if footprints is not None:
-        polygons = footprints.geometry.to_numpy()
-        footprints = footprints.iloc[buildings_near(polygons, change.places, distance=around)]
+    objects, footprints = store.objects, _hiding(database, store)
+    if not len(database.taxonomy.tall_codes):
+        # A viewpoint is at most the reach from a change, and its objects are that far from it
+        # again. Landmarks are seen from too many cells to look around each.
+        around = 2.0 * database.reach + TOUCHING_M
+        near = np.unique(store.index.pairs_within(change.places, radius=around)[1])
+        if len(near) == 0:
+            return database.select(slice(0))
+        objects = replace(objects, table=objects.table.iloc[near])
+        if footprints is not None:
+            polygons = footprints.geometry.to_numpy()
+            footprints = footprints.iloc[buildings_near(polygons, change.places, distance=around)]
     return build_cells(
-        replace(store.objects, table=store.objects.table.iloc[near]),
+        objects,
         *split_ids(change.cell_ids),
         grid=database.grid,
         spec=database.spec,
@@ -511,6 +587,7 @@ def _recompute(
         footprints=footprints,
         streets=store.streets,
         partial=True,
+        box=change.box,
         progress=progress,
     )
 

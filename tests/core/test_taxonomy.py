@@ -137,6 +137,6 @@ def test_error_names_an_unknown_class(
 
 def test_table_of_symbols_is_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
-        TAXONOMY.symbol_bytes[1] = 0
+        TAXONOMY.symbol_points[1] = 0
     assert TAXONOMY.decode([1, 2, 3]) == "B?D"
     assert not TAXONOMY.decode([])

@@ -26,7 +26,6 @@ from semsig_gis.core import (
     EmptyResultError,
     GridSpec,
     InputError,
-    PackedIndex,
     SignatureSpec,
     cells_near,
     resources,
@@ -58,11 +57,9 @@ def look(
     """Return all sightings, ordered by cell and object."""
     objects = np.asarray(places, dtype=float)
     columns, rows = np.asarray(numbers).reshape(-1, 2).T
-    index, reach = PackedIndex(objects), np.broadcast_to(np.float64(ranges), len(objects))
+    reach = np.broadcast_to(np.float64(ranges), len(objects))
     end, parts = 0, [SightingPairs(*(np.empty(0, kind) for kind in (int, int, float, float)))]
-    for block, pairs in sightings_by_block(
-        columns, rows, objects, grid=grid, index=index, ranges=reach
-    ):
+    for block, pairs in sightings_by_block(columns, rows, objects, grid=grid, ranges=reach):
         assert block.start == end
         end = block.stop
         size = block.stop - block.start
