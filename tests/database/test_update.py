@@ -490,4 +490,4 @@ def test_an_update_of_monaco_by_a_year_equals_a_rebuild(
     assert_index_fits(open_store(path))
     assert report.kept == report.notes == ()
     assert sum(item.added for item in report.classes) > 100
-    assert 0.1 < report.share < 0.6
+    assert 0.1 < report.share < 1.0  # a landmark changes very many cells
