@@ -67,6 +67,9 @@ class Quality(TypedDict):
     licenses: list[str]
     unread: list[street_objects.UnreadLayer]
     notes: list[str]
+    fronts: int
+    derived: int
+    texts: list[street_objects.TextColumn]
 
 
 @dataclass(frozen=True, kw_only=True)

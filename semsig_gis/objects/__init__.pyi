@@ -30,6 +30,7 @@ from .layers import read_files as read_files
 from .quality import SQUARE_M as SQUARE_M
 from .quality import ClassQuality as ClassQuality
 from .quality import QualityReport as QualityReport
+from .quality import TextColumn as TextColumn
 from .quality import quality_report as quality_report
 from .skipped_layers import layers_in_same_extracts as layers_in_same_extracts
 from .skipped_layers import read_small_layers as read_small_layers

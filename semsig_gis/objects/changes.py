@@ -68,7 +68,8 @@ class ObjectChanges:
 
     `same` (class and place), `moved` (same source, id and class) and `changed` (same source and id,
     other class) are pairs of rows of the old and the new table, shape (n, 2). `removed` and
-    `added`, shape (n,), are the other rows. `classes` are the changes by class.
+    `added`, shape (n,), are the other rows. `altered` are the pairs of `same` that have another
+    height, or belong to other things. `classes` are the changes by class.
     """
 
     same: NDArray[np.int64]
@@ -76,17 +77,20 @@ class ObjectChanges:
     changed: NDArray[np.int64]
     removed: NDArray[np.int64]
     added: NDArray[np.int64]
+    altered: NDArray[np.int64]
     classes: tuple[ClassChange, ...]
 
     @property
     def obsolete_rows(self) -> NDArray[np.int64]:
-        """Rows of the old table that were removed, moved or reclassified, shape (g,)."""
-        return np.concatenate([self.removed, self.moved[:, 0], self.changed[:, 0]])
+        """Rows of the old table that were removed, moved, altered or reclassified, shape (g,)."""
+        pairs = (self.moved, self.changed, self.altered)
+        return np.concatenate([self.removed, *(rows[:, 0] for rows in pairs)])
 
     @property
     def new_rows(self) -> NDArray[np.int64]:
-        """Rows of the new table that were added, moved or reclassified, shape (n,)."""
-        return np.concatenate([self.added, self.moved[:, 1], self.changed[:, 1]])
+        """Rows of the new table that were added, moved, altered or reclassified, shape (n,)."""
+        pairs = (self.moved, self.changed, self.altered)
+        return np.concatenate([self.added, *(rows[:, 1] for rows in pairs)])
 
 
 def compare_objects(old: StreetObjects, new: StreetObjects) -> ObjectChanges:
@@ -107,9 +111,41 @@ def compare_objects(old: StreetObjects, new: StreetObjects) -> ObjectChanges:
         _without(table, linked[:, side]).index.to_numpy() for side, table in enumerate(remaining)
     )
     changes = ObjectChanges(
-        same=same, moved=same_class, changed=other_class, removed=removed, added=added, classes=()
+        same=same,
+        moved=same_class,
+        changed=other_class,
+        removed=removed,
+        added=added,
+        altered=same[_is_altered(old, new, same)],
+        classes=(),
     )
     return replace(changes, classes=tuple(_by_class(old, new, changes)))
+
+
+def _is_altered(
+    old: StreetObjects, new: StreetObjects, same: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Return which pairs of rows have another height, or belong to other extended things."""
+    altered = np.zeros(len(same), bool)
+    sides = list(zip((old, new), same.T, strict=True))
+    if old.heights is not None or new.heights is not None:
+        first, second = (
+            np.full(len(rows), np.nan) if item.heights is None else item.heights[rows]
+            for item, rows in sides
+        )
+        altered |= (first != second) & ~(np.isnan(first) & np.isnan(second))
+    if old.groups is not None or new.groups is not None:
+        # Things are the same if each has all its points in common with just one thing.
+        groups = [
+            np.full(len(rows), -1) if item.groups is None else item.groups[rows]
+            for item, rows in sides
+        ]
+        pairs, pair = np.unique(np.stack(groups, axis=1), axis=0, return_inverse=True)
+        for side in (0, 1):
+            _, place, partners = np.unique(pairs[:, side], return_inverse=True, return_counts=True)
+            several = (partners[place] > 1) & (pairs[:, side] >= 0)
+            altered |= several[pair.ravel()]
+    return altered
 
 
 def _keys(objects: StreetObjects) -> pd.DataFrame:

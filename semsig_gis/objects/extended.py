@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -33,13 +34,15 @@ def thing_points(
     codes: NDArray[np.uint8],
     names: Sequence[str],
     *,
+    keys: Sequence[str],
     joins: NDArray[np.bool_],
 ) -> ThingPoints:
     """Return the points along lines and outlines.
 
     Shapes are in a metric CRS. Both ends of a line are points, and no two neighbours are more than
     5 m apart. Lines of a class that continue each other, where `joins` is true, are one thing:
-    those of the same name with touching ends, and those without a name where just two end.
+    those of the same name with touching ends, and those without a name where just two end. Rows
+    of a class with the same key, unless it is empty, are one thing, too.
     """
     parts, row = shapely.get_parts(shapes, return_index=True)
     areas = shapely.get_dimensions(parts) == AREA_DIMENSIONS
@@ -47,7 +50,10 @@ def thing_points(
     parts, whole = shapely.get_parts(parts, return_index=True)  # the rings of an area with holes
     row = row[whole]
     part, xy = _along(parts)
-    group = _continued(parts, row, codes, names, joins)
+    group = _joined(
+        len(codes),
+        itertools.chain(_same_keys(codes, keys), _continued(parts, row, codes, names, joins)),
+    )
     # Number the groups without gaps, in the order of the rows.
     _, first, groups = np.unique(group[row[part]], return_index=True, return_inverse=True)
     order = np.empty(len(first), np.int64)
@@ -71,15 +77,22 @@ def _along(parts: NDArray[np.object_]) -> tuple[NDArray[np.int64], NDArray[np.fl
     return part, shapely.get_coordinates(places)
 
 
+def _same_keys(codes: NDArray[np.uint8], keys: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """Yield pairs of rows of a class with the same key."""
+    first: dict[tuple[int, str], int] = {}
+    for row, key in enumerate(zip(codes.tolist(), keys, strict=True)):
+        if key[1]:
+            yield first.setdefault(key, row), row
+
+
 def _continued(
     parts: NDArray[np.object_],
     row: NDArray[np.int64],
     codes: NDArray[np.uint8],
     names: Sequence[str],
     joins: NDArray[np.bool_],
-) -> NDArray[np.int64]:
-    """Return the first row of the thing that each row belongs to."""
-    group = np.arange(len(codes))
+) -> Iterator[tuple[int, int]]:
+    """Yield pairs of rows with lines that continue each other."""
     ends_of: dict[tuple[int, str, int, int], list[int]] = {}
     open_lines = joins[row] & ~shapely.is_closed(parts) & (shapely.get_dimensions(parts) == 1)
     for index in (0, -1):
@@ -87,16 +100,22 @@ def _continued(
         places = np.rint(points / TOUCH_M).astype(np.int64).tolist()
         for thing, (x, y) in zip(row[open_lines].tolist(), places, strict=True):
             ends_of.setdefault((int(codes[thing]), names[thing], x, y), []).append(thing)
-
-    def root(thing: int) -> int:
-        while group[thing] != thing:
-            group[thing] = group[group[thing]]
-            thing = int(group[thing])
-        return thing
-
     for (_, name, _, _), (first, *others) in ends_of.items():
         if name or len(others) == 1:
-            for other in others:
-                low, high = sorted((root(first), root(other)))
-                group[high] = low
-    return np.array([root(thing) for thing in range(len(group))], np.int64)
+            yield from ((first, other) for other in others)
+
+
+def _joined(size: int, pairs: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
+    """Return the first row of the thing that each row belongs to, by pairs of the same thing."""
+    group = list(range(size))
+
+    def root(row: int) -> int:
+        while group[row] != row:
+            group[row] = group[group[row]]
+            row = group[row]
+        return row
+
+    for first, second in pairs:
+        low, high = sorted((root(first), root(second)))
+        group[high] = low
+    return np.array([root(row) for row in range(size)], np.int64)

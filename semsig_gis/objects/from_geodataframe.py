@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING
 import geopandas as gpd
 
 from semsig_gis.core import (
+    GROUP,
+    HEIGHT,
     LICENSES,
     SOURCE_ID,
+    TEXTS,
     CrsError,
     EmptyResultError,
     InputError,
@@ -72,7 +75,8 @@ def objects_from_frame(
         One row per feature, in any CRS. A feature that is not a point is placed at its centroid.
     class_column : str, optional
         Column of class names; rows without a value are omitted. The classes are those of
-        `catalog`, or of all built-in catalogues.
+        `catalog`, or of all built-in catalogues. Columns such as ``name``, ``height`` and ``group``
+        are kept, as `StreetObjects` has them.
     new_classes : sequence of str or ObjectClass, optional
         Further classes in this column, by name (see `Taxonomy.extended`).
     tags : bool, default False
@@ -195,6 +199,9 @@ def _by_column(
         class_name="",
         class_by=ClassBy(column, tuple((name, name) for name in names)),
         id_field=SOURCE_ID if SOURCE_ID in frame else None,
+        texts=tuple((name, name) for name in TEXTS if name in frame and name != column),
+        height_field=HEIGHT if HEIGHT in frame else None,
+        group_field=GROUP if GROUP in frame else None,
     )
     layer = _by_rules(frame, spec)
     unknown = [str(value) for value in frame[column].dropna().unique() if value not in names]

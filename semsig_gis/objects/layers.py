@@ -27,6 +27,7 @@ from semsig_gis.core import (
     Displayed,
     EmptyResultError,
     InputError,
+    Taxonomy,
     crs_text,
     map_with,
     require_metric_crs,
@@ -66,7 +67,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core import AnyCrs, MapFrame, Taxonomy
+    from semsig_gis.core import AnyCrs, MapFrame
     from semsig_gis.objects.extended import ThingPoints
     from semsig_gis.objects.table import StreetObjects
     from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer, Role, RowCounts
@@ -82,6 +83,7 @@ class LayerReport:
     """Counts of the rows of a layer; `notes` are warnings and messages on unreadable rows.
 
     `role` is "objects", "buildings" or "streets"; `classes` are the possible classes of objects.
+    `derived` objects were computed from streets and buildings.
     """
 
     name: str
@@ -89,6 +91,7 @@ class LayerReport:
     notes: tuple[str, ...] = ()
     role: Role = "objects"
     classes: tuple[str, ...] = ()
+    derived: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,15 +229,23 @@ def build_objects(
             collapsed=len(part.xy) - duplicate_count - remaining_count,
         )
         notes = (*layer.notes, *layer.errors)
-        reports.append(LayerReport(layer.spec.name, row_counts, notes, classes=layer.spec.classes))
+        reports.append(
+            LayerReport(
+                layer.spec.name,
+                row_counts,
+                notes,
+                classes=layer.spec.classes,
+                derived=layer.spec.derive is not None,
+            )
+        )
     report = LoadReport(tuple(reports))
     columns = {
         CLASS_CODE: codes[rows],
         SOURCE: pa.array(names.tolist(), pa.string()).take(pa.array(source[owner[rows]])),
         SOURCE_ID: ids.take(pa.array(rows)),
         COUNT: counts.astype(np.int32),
-        GROUP: groups,
         **{name: values.take(pa.array(rows)) for name, values in facts.items()},
+        GROUP: groups,
         GEOMETRY: points_to_wkb(places),
     }
     objects = arrow_objects(
@@ -256,18 +267,21 @@ def _thing_points(
     taxonomy: Taxonomy,
 ) -> ThingPoints:
     """Return the points of the extended things in some rows."""
-    names = facts[NAME].take(pa.array(rows)).to_pylist() if NAME in facts else [""] * len(rows)
+    names, keys = (
+        facts[name].take(pa.array(rows)).to_pylist() if name in facts else [""] * len(rows)
+        for name in (NAME, GROUP)
+    )
     lines = [item.code for item in taxonomy.classes if item.shape == "line"]
-    return thing_points(shapes, codes, names, joins=np.isin(codes, lines))
+    return thing_points(shapes, codes, names, keys=keys, joins=np.isin(codes, lines))
 
 
 def _facts(parts: Sequence[_Placed]) -> dict[str, pa.ChunkedArray]:
-    """Return the heights and texts of all layers; rows of layers without a column have no value."""
+    """Return heights, texts and groups of all layers; layers without a column have no value."""
     columns = {}
-    for name in (HEIGHT, *TEXTS):
+    for name in (HEIGHT, GROUP, *TEXTS):
         if any(name in part.facts.column_names for part in parts):
             kind = pa.float32() if name == HEIGHT else pa.string()
-            empty = pa.scalar(OPTIONAL[name], kind)
+            empty = pa.scalar(OPTIONAL[name] if name == HEIGHT else "", kind)
             values = pa.chunked_array(
                 [
                     chunk
@@ -617,16 +631,20 @@ def assemble(
         crs=system,
         within=covered_area(layers, system),
     )
+    of_objects = [layer for layer in layers if layer.spec.role == "objects"]
+    taxonomy = _taxonomy_of(catalog, of_objects)
+    names = {item.name for item in taxonomy.classes}
+    radii = {name: radius for name, radius in catalog.conflate if name in names and merge}
     objects, report = build_objects(
-        [layer for layer in layers if layer.spec.role == "objects"],
-        taxonomy=catalog.taxonomy,
+        of_objects,
+        taxonomy=taxonomy,
         crs=system,
         collapse=collapse,
-        apart=[name for name, _ in catalog.conflate] if merge else (),
+        apart=radii,
     )
     merged = ConflationReport(())
-    if merge and catalog.conflate:
-        objects, merged = conflate(objects, dict(catalog.conflate))
+    if radii:
+        objects, merged = conflate(objects, radii)
     fronts = 0
     if buildings is not None and len(buildings):
         objects, fronts = moved_to_fronts(objects, buildings, streets)
@@ -643,6 +661,16 @@ def assemble(
         streets=streets,
         notes=notes,
     )
+
+
+def _taxonomy_of(catalog: Catalog, layers: Sequence[RawLayer]) -> Taxonomy:
+    """Return the classes of a catalogue, without landmarks that no layer has.
+
+    A database with landmarks, which are seen from far away, has coarser distances.
+    """
+    names = {name for layer in layers for name in layer.spec.classes}
+    classes = catalog.taxonomy.classes
+    return Taxonomy(tuple(item for item in classes if not item.tall or item.name in names))
 
 
 def _unread(

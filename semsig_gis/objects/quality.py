@@ -14,9 +14,18 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 import shapely
 
-from semsig_gis.core import COUNT, Displayed, crs_label, degree_bounds, plane_distortion
+from semsig_gis.core import (
+    COUNT,
+    SOURCE,
+    SOURCE_ID,
+    Displayed,
+    crs_label,
+    degree_bounds,
+    plane_distortion,
+)
 from semsig_gis.storage import whole_numbers
 
 if TYPE_CHECKING:
@@ -38,9 +47,10 @@ M2_PER_KM2 = 1e6
 class ClassQuality:
     """Number and density of the objects of one class, after collapsing and conflation.
 
-    `rows` is the number of rows of the sources that they were made of. `per_km2_hull` is None if
-    the hull has no area; `nearest_m` is the median distance in metres to the nearest other object
-    of the class, None for a single object.
+    An extended thing counts as one object; `points` is the number of points that such things are
+    stored as, 0 for a class of points. `rows` is the number of rows of the sources that they were
+    made of. `per_km2_hull` is None if the hull has no area; `nearest_m` is the median distance in
+    metres to the nearest other object of the class, None for a single object and extended things.
     """
 
     class_name: str
@@ -50,6 +60,17 @@ class ClassQuality:
     per_km2_hull: float | None
     per_km2_occupied: float
     nearest_m: float | None
+    family: str = ""
+    points: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextColumn:
+    """A column of what is written on objects: how many have a text, and its bytes, compressed."""
+
+    name: str
+    objects: int
+    bytes: int
 
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
@@ -60,8 +81,10 @@ class QualityReport(Displayed):
     loaded layers without objects; classes only in `unread` layers are in neither. `sources` are in
     the order of loading. `crs` is a code, or else a name. Extents are west, south, east and north,
     in metres and in degrees of WGS 84. `hull_km2` is the area of the convex hull of all objects,
-    `occupied_km2` the area of the squares of 100 m that contain an object. `notes` are warnings
-    about the whole load; warnings about a layer are in `sources`.
+    `occupied_km2` the area of the squares of 100 m that contain an object. `fronts` objects were
+    moved to the fronts of their buildings, `derived` objects were computed from streets and
+    buildings, and `texts` are the columns of what is written on objects. `notes` are warnings about
+    the whole load; warnings about a layer are in `sources`.
     """
 
     classes: tuple[ClassQuality, ...]
@@ -77,6 +100,9 @@ class QualityReport(Displayed):
     licenses: tuple[str, ...]
     unread: tuple[UnreadLayer, ...] = ()
     notes: tuple[str, ...] = ()
+    fronts: int = 0
+    derived: int = 0
+    texts: tuple[TextColumn, ...] = ()
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -170,7 +196,22 @@ def quality_report(
         licenses=tuple(map(str, objects.licenses)),
         unread=load.unread,
         notes=tuple(notes),
+        fronts=load.fronts,
+        derived=sum(layer.counts.kept for layer in load.layers if layer.derived),
+        texts=_text_columns(objects),
     )
+
+
+def _text_columns(objects: StreetObjects) -> tuple[TextColumn, ...]:
+    texts = objects.texts
+    if texts is None:
+        return ()
+    columns = []
+    for name in texts.column_names:
+        values = [text for text in texts[name].to_pylist() if text]
+        size = len(pa.compress("\0".join(values).encode(), codec="zstd", asbytes=True))
+        columns.append(TextColumn(name=name, objects=len(values), bytes=size))
+    return tuple(columns)
 
 
 def _class_quality(
@@ -178,14 +219,23 @@ def _class_quality(
 ) -> ClassQuality:
     members = objects.codes == item.code
     number = int(members.sum())
+    rows = int(whole_numbers(objects.arrow[COUNT])[members].sum())
+    points = 0
+    if objects.groups is not None and (objects.groups[members] >= 0).any():
+        points = number
+        number = len(np.unique(objects.groups[members]))
+        ids = objects.arrow.select([SOURCE, SOURCE_ID]).filter(pa.array(members))
+        rows = len(ids.group_by([SOURCE, SOURCE_ID]).aggregate([]))
     return ClassQuality(
         class_name=item.name,
         title=item.title,
         objects=number,
-        rows=int(whole_numbers(objects.arrow[COUNT])[members].sum()),
+        rows=rows,
         per_km2_hull=number / hull_km2 if hull_km2 > 0 else None,
         per_km2_occupied=number / occupied_km2,
-        nearest_m=_nearest(objects.xy[members]),
+        nearest_m=None if points else _nearest(objects.xy[members]),
+        family=item.family,
+        points=points,
     )
 
 

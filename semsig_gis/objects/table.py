@@ -275,12 +275,12 @@ def arrow_objects(arrow: pa.Table, *, xy: NDArray[np.float64], **attributes: Any
 
 def without_empty(arrow: pa.Table) -> pa.Table:
     """Return the columns of objects without the optional ones in which no object has a value."""
-    names = {*REQUIRED, MERGED, GEOMETRY}  # conflated objects have `merged` in any case
+    always = {*REQUIRED, MERGED, GEOMETRY}  # conflated objects have `merged` in any case
     return arrow.select(
         [
             name
             for name in arrow.column_names
-            if name in names or (name in COLUMNS and _has_value(arrow[name], OPTIONAL[name]))
+            if name in always or (name in COLUMNS and _has_value(arrow[name], OPTIONAL[name]))
         ]
     )
 

@@ -68,7 +68,8 @@ class RawLayer(Displayed):
         One row per feature: ``class_name`` and ``source_id``. For streets also ``half_width``
         (metres from the centre line, or NaN) and ``name`` (empty if there is none), where the
         catalogue gives widths or the field of names. For objects also the texts, empty if there is
-        none, and for objects and buildings ``height`` (metres, or NaN), if any row has one.
+        none, ``group`` where the catalogue has its field, and for objects and buildings ``height``
+        (metres, or NaN), if any row has one.
     geometry : array of shapely.Geometry, optional
         The geometry of every row, shape (n,): of any type, empty, or None.
     crs : pyproj.CRS, optional

@@ -172,6 +172,8 @@ class LayerSpec:
     height_field, levels_field : str, optional
         For objects and buildings: the field of the height in metres, and the field of the number of
         storeys, which gives the height where the first one does not.
+    group_field : str, optional
+        For extended things: a field with the same value in all rows of one thing.
     derive : {"junctions", "dead_ends", "building_corners", "gaps"}, optional
         What the objects of the layer are computed from, streets and buildings, instead of files.
     id_field : str, optional
@@ -231,6 +233,7 @@ class LayerSpec:
     texts: TextFields = ()
     height_field: str | None = None
     levels_field: str | None = None
+    group_field: str | None = None
     derive: Derivation | None = None
     id_field: str | None = None
     geometry: GeometryKind = "point"
@@ -291,6 +294,7 @@ class LayerSpec:
         uses += [("texts", field) for _, field in self.texts]
         uses += [("height_field", self.height_field)] if self.height_field else []
         uses += [("levels_field", self.levels_field)] if self.levels_field else []
+        uses += [("group_field", self.group_field)] if self.group_field else []
         uses += [("id_field", self.id_field)] if self.id_field else []
         return tuple(uses)
 
@@ -340,6 +344,8 @@ class LayerSpec:
             raise CatalogError("only objects have texts; remove it, or use name_field.")
         if self.has_height and self.role == "streets":
             raise CatalogError("streets have no height; remove height_field and levels_field.")
+        if self.group_field is not None and self.role != "objects":
+            raise CatalogError("only objects have group_field; remove it or the role.")
         unknown = next((column for column, _ in self.texts if column not in TEXTS), None)
         if unknown is not None:
             raise CatalogError(

@@ -20,6 +20,7 @@ from pyproj.exceptions import CRSError
 
 from semsig_gis.core import (
     CLASS_NAME,
+    GROUP,
     HALF_WIDTH,
     HEIGHT,
     MAX_HEIGHT_M,
@@ -552,6 +553,8 @@ class RowRules:
             texts = _texts(columns, field, size)
             if pc.any(pc.not_equal(texts, "")).as_py():
                 result[column] = texts
+        if spec.group_field is not None:
+            result[GROUP] = _texts(columns, spec.group_field, size)
         if spec.has_height:
             heights = self._heights(columns, size)
             if not np.isnan(heights).all():

@@ -13,18 +13,23 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from osm_xml import node, relation, way
-from raw_layers import raw_layer
+from raw_layers import catalog_of, raw_layer
 from sentences import refused
 
 from semsig_gis.core import CatalogError
 from semsig_gis.objects import (
+    assemble,
     build_objects,
+    compare_objects,
     conflate,
     load,
+    objects_from_frame,
     open_objects,
+    quality_report,
     replace_layers,
     save_objects,
 )
+from semsig_gis.output import quality_sentence
 from semsig_gis.sources import built_in_taxonomy, clip_layer, load_catalog, parse_area
 
 if TYPE_CHECKING:
@@ -197,8 +202,14 @@ def test_things_texts_and_heights_of_an_extract_are_kept(
     save_objects(objects, saved, keep_order=True)
     again = open_objects(saved)
     assert again.table.equals(objects.table)
-    frame = again.to_geodataframe()
-    assert frame["name"].tolist()[0] == "Repos"
+    back = objects_from_frame(
+        again.to_geodataframe(), class_column="class_name", metric_crs=objects.crs
+    )
+    assert back.texts is not None
+    assert back.texts.equals(objects.texts)
+    assert back.groups is not None
+    pairs = {*zip(back.groups.tolist(), objects.groups.tolist(), strict=True)}
+    assert len(pairs) == 3  # the benches and two things
     # A layer that is loaded again gets groups that no other layer has.
     changed, _, _ = replace_layers(objects, load(file, catalog=catalog, layers=["rivers"]).objects)
     assert changed.groups is not None
@@ -226,3 +237,33 @@ def test_wrong_key_is_refused(tmp_path: Path, old: str, new: str, words: list[st
     (tmp_path / "town.toml").write_text(CATALOG.replace(old, new, 1), "utf-8")
     with refused(CatalogError, *words):
         load_catalog(tmp_path / "town.toml")
+
+
+def test_rivers_that_become_one_are_altered() -> None:
+    lines = [shapely.LineString([(0, 0), (0, 20)]), shapely.LineString([(0, 20), (0, 40)])]
+    apart, joined = (build(things(lines, names=names)) for names in (["Po", "Adda"], ["Po", "Po"]))
+    changes = compare_objects(apart, joined)
+    assert len(changes.altered) == len(changes.same) == len(apart)
+    assert len(compare_objects(joined, joined).altered) == 0
+    assert len(changes.obsolete_rows) == len(changes.new_rows) == len(apart)
+
+
+def test_thing_is_one_object_of_a_report() -> None:
+    line = shapely.LineString([(0, 0), (0, 100)])
+    layer = things([line], names=["Po"])
+    objects, load_report = build_objects([layer], taxonomy=TAXONOMY, crs="EPSG:2154")
+    report = quality_report(objects, load_report)
+    (river,) = report.classes
+    assert (river.objects, river.points, river.rows, river.nearest_m) == (1, 21, 1, None)
+    assert [(item.name, item.objects) for item in report.texts] == [("name", 21)]
+    assert "1 extended thing as 21 points" in quality_sentence(report)
+
+
+def test_landmarks_that_no_layer_has_are_no_classes() -> None:
+    catalog = catalog_of(taxonomy=TAXONOMY, conflate=(("church_tower", 5.0),))
+    for kind, there in (("bench", False), ("church_tower", True)):
+        places = [shapely.Point(600_000 + 9 * row, 6_800_000) for row in range(4)]
+        loaded = assemble([raw_layer(places, classes=kind)], catalog)
+        names = {item.name for item in loaded.objects.taxonomy.classes}
+        assert ("church_tower" in names) is there
+        assert "minaret" not in names

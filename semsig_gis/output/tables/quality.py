@@ -21,7 +21,7 @@ ROW_COUNTS = tuple(field.name for field in fields(RowCounts))
 FREQUENT = 3  # classes in the sentence of a load
 NOTES_SHOWN = 4  # per layer; one with many unreadable rows would have too many
 # Tables that are omitted when they have no rows.
-MAY_BE_EMPTY = frozenset({"Conflated", "Layers not read"})
+MAY_BE_EMPTY = frozenset({"Objects by family", "Texts", "Conflated", "Layers not read"})
 
 
 def quality_tables(report: QualityReport) -> tuple[Table, ...]:
@@ -35,8 +35,8 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
     Returns
     -------
     tuple of Table
-        Four tables; if there are any, also a table of layers that were not read, of conflated
-        objects and of notes.
+        Four tables; if there are any, also a table of families, of texts, of layers that were not
+        read, of conflated objects and of notes.
 
     Examples
     --------
@@ -50,6 +50,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
     """
     sides = "west, south, east, north"
     tables = (
+        _family_table(report),
         _class_table(report),
         _layer_table(report),
         Table(
@@ -68,6 +69,12 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
                 "that would be kept, before objects at one place are collapsed."
             ),
             labels=2,
+        ),
+        Table(
+            "Texts",
+            ("column", "objects", "bytes"),
+            tuple((item.name, f"{item.objects:,}", f"{item.bytes:,}") for item in report.texts),
+            note="What is written on objects, and about what it adds to the file.",
         ),
         Table(
             "Conflated",
@@ -97,14 +104,48 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
     return tuple(table for table in tables if table.rows or table.title not in MAY_BE_EMPTY)
 
 
-def _class_table(report: QualityReport) -> Table:
-    absent = f" No objects of: {', '.join(report.absent)}." if report.absent else ""
+def _family_table(report: QualityReport) -> Table:
+    """Return the objects of families, if there are several."""
+    families = dict.fromkeys(item.family for item in report.classes)
+    members = {
+        family: [item for item in report.classes if item.family == family]
+        for family in (families if len(families) > 1 else ())
+    }
+    points = any(item.points for item in report.classes)
     return Table(
-        "Objects by class",
-        ("class", "objects", "rows", "per km² of hull", "per km² occupied", "nearest, m"),
+        "Objects by family",
+        ("family", "classes", "objects", *(["points"] if points else []), "per km² occupied"),
         tuple(
             (
-                *(item.title.lower(), f"{item.objects:,}", f"{item.rows:,}"),
+                family or "none",
+                f"{len(items):,}",
+                f"{sum(item.objects for item in items):,}",
+                *([_points_text(sum(item.points for item in items))] if points else []),
+                _decimal_text(sum(item.per_km2_occupied for item in items)),
+            )
+            for family, items in members.items()
+        ),
+    )
+
+
+def _points_text(number: int) -> str:
+    return f"{number:,}" if number else ""
+
+
+def _class_table(report: QualityReport) -> Table:
+    absent = f" No objects of: {', '.join(report.absent)}." if report.absent else ""
+    points = any(item.points for item in report.classes)
+    return Table(
+        "Objects by class",
+        (
+            *("class", "objects", *(["points"] if points else []), "rows"),
+            *("per km² of hull", "per km² occupied", "nearest, m"),
+        ),
+        tuple(
+            (
+                *(item.title.lower(), f"{item.objects:,}"),
+                *([_points_text(item.points)] if points else []),
+                f"{item.rows:,}",
                 *map(_decimal_text, (item.per_km2_hull, item.per_km2_occupied, item.nearest_m)),
             )
             for item in report.classes
@@ -115,6 +156,7 @@ def _class_table(report: QualityReport) -> Table:
             f"{report.occupied_km2:,.2f} km². Nearest: the median distance to the nearest other "
             f"object of the class.{absent}"
         ),
+        minor=("per km² of hull", "rows") if points else (),
     )
 
 
@@ -157,8 +199,23 @@ def quality_sentence(report: QualityReport) -> str:
     more = f" and {rest:,} more class{'es' if rest > 1 else ''}" if rest else ""
     return (
         f"{_many(report.objects, 'street object')} of {_many(len(report.classes), 'class', 'es')} "
-        f"on {report.hull_km2:,.2f} km²: {names}{more}."
+        f"on {report.hull_km2:,.2f} km²: {names}{more}.{_origins(report)}"
     )
+
+
+def _origins(report: QualityReport) -> str:
+    """Return a sentence on extended things, fronts and derived objects, if there are any."""
+    extended = [item for item in report.classes if item.points]
+    parts = []
+    if extended:
+        things = sum(item.objects for item in extended)
+        points = sum(item.points for item in extended)
+        parts.append(f"{_many(things, 'extended thing')} as {_many(points, 'point')}")
+    if report.fronts:
+        parts.append(f"{report.fronts:,} moved to the fronts of their buildings")
+    if report.derived:
+        parts.append(f"{report.derived:,} computed from streets and buildings")
+    return f" Of these, {', '.join(parts)}." if parts else ""
 
 
 def _many(number: int, noun: str, ending: str = "s") -> str:

@@ -60,6 +60,7 @@ def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
         id_field=spec.id_field and own(spec.id_field),
         width_field=spec.width_field and own(spec.width_field),
         name_field=spec.name_field and own(spec.name_field),
+        group_field=spec.group_field and own(spec.group_field),
         height_field=spec.height_field and own(spec.height_field),
         levels_field=spec.levels_field and own(spec.levels_field),
         texts=tuple((column, own(field)) for column, field in spec.texts),

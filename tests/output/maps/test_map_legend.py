@@ -49,7 +49,7 @@ BENCH = ClassChange(
 STILL = dataclasses.replace(BENCH, class_name="bus_stop", added=0, removed=0, moved=0)
 CHANGES = ObjectChanges(
     same=ROWS, moved=ROWS[:5], changed=ROWS[:0], removed=ROWS[:1, 0], added=ROWS[:2, 0],
-    classes=(STILL, BENCH),
+    altered=ROWS[:0], classes=(STILL, BENCH),
 )  # fmt: skip
 
 
