@@ -109,7 +109,10 @@ def export_database(
     `Identifiability.table`. `read_geopackage` reads the database back.
 
     Layer ``objects``, in the CRS of the objects: ``class_code``, ``symbol``, ``class_name``,
-    ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``.
+    ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``; where
+    they are known, ``family`` (of the class), ``name``, ``brand``, ``operator``, ``ref``,
+    ``house_number``, ``street``, ``height`` (metres) and ``group`` (the points of one line or area
+    have the same).
 
     Layers ``buildings`` and ``streets``, in the CRS of the database: what is within 250 m of the
     box of the cells, with its ``name`` where it is known.

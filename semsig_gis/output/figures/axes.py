@@ -20,7 +20,9 @@ from semsig_gis.core import (
     InputError,
     UnknownNameError,
     class_signs,
+    codes_by_family,
     extra,
+    family_named,
     nearest_name,
     percent,
 )
@@ -224,6 +226,12 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
         order: dict[str, Any] = {"zorder": 3 - count / len(objects), "rasterized": count >= MANY}
         axes.plot(*objects.xy[objects.codes == code].T, markersize=size, **style, **order)
         keys.append(Line2D([], [], markersize=7 * share, label=title, **style))
+    families = codes_by_family(objects.taxonomy, counts)
+    if len(keys) > KEYS and len(families) > 1:
+        keys = [
+            _family_key(family, sum(counts[code] for code in codes))
+            for family, codes in families.items()
+        ]
     axes.set_title(f"{len(objects):,} street objects")
     _frame(axes)
     if legend and ax is None:
@@ -233,6 +241,14 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
     return axes
 
 
+def _family_key(name: str, count: int) -> Line2D:
+    """Return the key of the classes of a family."""
+    family = family_named(name)
+    style: dict[str, Any] = {"linestyle": "", "marker": "o", "color": family.colour}
+    return Line2D([], [], markersize=7, label=f"{family.title} ({count:,})", **style)
+
+
+KEYS = 40  # of classes in a legend; more are shown by family
 MANY, CROWD = 2000, 10_000  # numbers of objects of a class, and of all, with smaller markers
 SIZES = ((MANY, 2.0), (200, 3.5), (0, 6.5))  # of markers, by the least number of objects
 

@@ -100,6 +100,8 @@ PLACE_NAMES = (
 CANDIDATE_NAMES = ("chance", "cell_chance", "distance", "loglik", "heading", "cell_id")
 REGION_NAMES = ("chance", "cells", "km2", "best_cell_id")
 LISTED_NAMES = ("chance", "distance", "types", "cell_id")
+SAID_COLUMNS = "seen_class", "seen_title", "seen_text", "seen_bearing", "seen_range"
+THERE_COLUMNS = "object_class", "object_title", "object_text", "bearing", "distance"
 SAID = {
     "matched": "said, and there",
     "misnamed": "said, but of another class",
@@ -188,14 +190,17 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
     symbols = {item.name: item.symbol for item in location.taxonomy.classes}
     north, query = location.north, View.of(location.query)
 
-    def part(name: str | None, bearing: float | None, metres: float | None) -> Any:  # noqa: ANN401 - as JSON has it
-        """Return the class of an object, and its bearing and distance as a text."""
+    def part(
+        name: str | None, title: str, read: str | None, bearing: float | None, metres: float | None
+    ) -> Any:  # noqa: ANN401 - as JSON has it
+        """Return the class of an object, and its text, bearing and distance as a text."""
         if name is None:
             return None
         turn = "" if bearing is None else f"{north.from_grid(bearing):.0f}°"
         away = "" if metres is None else f"{metres:.0f} m"
-        text = ", ".join(filter(None, (turn, away)))
-        return {"symbol": symbols.get(name, "?"), "text": text}
+        quoted = f"“{read}”" if read else ""
+        text = ", ".join(filter(None, (quoted, turn, away)))
+        return {"symbol": symbols.get(name, "?"), "title": title, "text": text}
 
     undirected, others = set[int](), list[tuple[str, str]]()
     if rank <= len(location.explanations):
@@ -203,10 +208,10 @@ def _compared(location: Location, candidate: Mapping[str, Any], rank: int) -> di
     rays = [
         {
             **{name: row[name] for name in ("verdict", "to", "sign")},
-            "said": part(row["seen_class"], row["seen_bearing"], row["seen_range"])
+            "said": part(*(row[name] for name in SAID_COLUMNS))
             if number not in undirected
-            else {**part(row["object_class"], None, None), "text": "no direction"},
-            "there": part(row["object_class"], row["bearing"], row["distance"]),
+            else {**part(*(row[name] for name in THERE_COLUMNS)), "text": "no direction"},
+            "there": part(*(row[name] for name in THERE_COLUMNS)),
         }
         for number, row in enumerate(candidate["rays"])
         if row["verdict"] in COUNTED

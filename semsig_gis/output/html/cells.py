@@ -156,6 +156,9 @@ def packed_signatures(
         f"{name}.farBearings": packed(np.where(far, database.bearing_units, 0).astype(np.uint16)),
         f"{name}.farUnits": packed(np.where(far, database.distance_units, 0).astype(np.uint8)),
     }
+    widths = database.extents
+    whole = None if widths is None else np.rint(widths).astype(np.uint16)
+    extents = {} if whole is None else {f"{name}.extents": packed(whole)}
     return {
         f"{name}.types": packed(database.codes),
         f"{name}.ends": steps(ends.astype(np.int32)),
@@ -164,6 +167,7 @@ def packed_signatures(
         f"{name}.y": steps(places[:, 1]),
         f"{name}.classes": packed(codes),
         **(landmarks if far.any() else {}),
+        **extents,
     }
 
 

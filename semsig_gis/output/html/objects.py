@@ -16,6 +16,7 @@ from semsig_gis.core import (
     NAME,
     SOURCE,
     SOURCE_ID,
+    TEXTS,
     CrsError,
     EmptyResultError,
     class_signs,
@@ -57,6 +58,9 @@ STREET_WIDTH_M = 6.0
 DETAIL_M = 0.6  # smaller details are not drawn
 POLYGONAL = 2
 FIELDS = ("Class", "Source", "Identifier", "Represents", "Also", "Latitude, longitude")
+TEXT_TITLES = dict(
+    zip(TEXTS, ("Name", "Brand", "Operator", "Number on it", "House number", "Street"), strict=True)
+)
 
 
 def ground_map(
@@ -297,6 +301,10 @@ def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[
         "count": table[COUNT].to_numpy(np.int32),
         "merged": table[MERGED].astype(str).tolist() if MERGED in table else [],
     }
+    if objects.groups is not None:
+        arrays["part"] = _parts(objects.groups[order])
+    texts = [name for name in TEXTS if name in table]
+    arrays |= {f"text.{name}": table[name].astype(str).tolist() for name in texts}
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     ends = np.cumsum(list(counts.values())).tolist()
     classes = [
@@ -307,12 +315,22 @@ def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[
         "classes": classes,
         "sources": sources.tolist(),
         "fields": FIELDS,
+        "texts": {f"text.{name}": TEXT_TITLES[name] for name in texts},
         # Rare classes last, so that they lie on top.
         "order": np.argsort([-count for count in counts.values()], kind="stable").tolist(),
     }
     columns = {name: packed(values) for name, values in arrays.items()}
     columns |= {name: steps(part) for name, part in zip("xy", places.T, strict=True)}
     return columns, about
+
+
+def _parts(groups: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Return 1 for the points of extended things, but for one in the middle of each: its sign."""
+    sizes = np.bincount(groups[groups >= 0])
+    within = pd.Series(groups).groupby(groups).cumcount().to_numpy()
+    middle = np.where(groups < 0, 0, sizes[groups] // 2)
+    parts: NDArray[np.uint8] = ((groups >= 0) & (within != middle)).astype(np.uint8)
+    return parts
 
 
 def objects_legend(objects: StreetObjects) -> str:

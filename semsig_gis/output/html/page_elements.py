@@ -421,6 +421,7 @@ def cell_signature(
     look: dict[str, Any] = {
         "reach": database.near_reach,
         "metres": _whole_metres(row.distances),
+        **({} if row.extents is None else {"extents": np.rint(row.extents).astype(int).tolist()}),
         **({} if place is None else {"place": list(place)}),
     }
     if isinstance(query, View):

@@ -104,9 +104,11 @@ verdict = ["Verdict", "Whether the object of the query is a street object, and w
 candidate = ["Candidate", "Rank of the place from which the objects are compared."]
 chance = ["Chance", "Of the verdict being right, from 0 to 1.", "1", 2]
 seen_title = ["Seen as", "Class of the object of the query."]
+seen_text = ["Read", "Text that was read on the object of the query."]
 seen_bearing = ["Bearing seen", "From the candidate, clockwise from grid north.", "°", 1]
 seen_range = ["Distance seen", "From the candidate.", "m", 1]
 object_title = ["Street object", "Class of the street object."]
+object_text = ["Text there", "Text of the street object that is most like it."]
 bearing = ["Bearing", "Of the street object.", "°", 1]
 distance = ["Distance", "Of the street object.", "m", 1]
 bearing_error = ["Off by", "From the bearing of the street object to that seen, clockwise.", "°", 1]
@@ -114,6 +116,8 @@ source = ["Source", "Of the street object."]
 source_id = ["Identifier", "Of the street object in its source."]
 """)
 
+# Columns of a query with texts.
+TEXTS_READ = ("seen_text", "object_text")
 # Meaning of each verdict on an object, and the style of its ray; the default colour is that of
 # `VERDICTS`.
 RAYS: dict[str, tuple[str, dict[str, object]]] = {
@@ -270,7 +274,8 @@ def answer_layers(
             for rank, explanation in enumerate(answer.explanations, start=1)
             for row in explanation_rows(answer, explanation)
         ]
-        fields = OBJECT_FORM["Object"]
+        read = any(row["seen_text"] for row in rays)
+        fields = [field for field in OBJECT_FORM["Object"] if read or field.name not in TEXTS_READ]
         ray_table = pd.DataFrame(rays, columns=[field.name for field in fields])
         # A column of numbers is one even without any number.
         ray_table = ray_table.astype({field.name: float for field in fields if field.decimals})
@@ -324,10 +329,12 @@ def explanation_rows(location: Location, explanation: Explanation) -> list[dict[
             "title": title(row["object_class"] or row["query_class"]),
             "seen_class": row["query_class"],
             "seen_title": title(row["query_class"]),
+            "seen_text": row.get("query_text"),
             "seen_bearing": row["query_bearing"],
             "seen_range": row["query_range"],
             "object_class": row["object_class"],
             "object_title": title(row["object_class"]),
+            "object_text": row.get("object_text"),
             "bearing": row["object_bearing"],
             "distance": row["distance"],
             "bearing_error": row["bearing_error"],

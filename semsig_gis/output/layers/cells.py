@@ -29,6 +29,7 @@ types = ["Types", "Symbols of the street objects that are seen, clockwise from n
 length = ["Objects seen", "How many street objects are seen from the cell."]
 bearings = ["Bearings", "Of the same objects, clockwise from grid north.", "°"]
 distances = ["Distances", "Of the same objects, from the viewpoint.", "m"]
+extents = ["Extents", "Angles over which extended things are seen; 0 for others.", "°"]
 levels = ["Angle levels", "The bearings, in whole sectors of the full turn."]
 ["Cells like it"]
 type_group_size = ["Cells with the same types", "1: no other cell."]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -13,9 +13,12 @@ from semsig_gis.core import (
     CLASS_NAME,
     COUNT,
     GEOMETRY,
+    GROUP,
+    HEIGHT,
     MERGED,
     SOURCE,
     SOURCE_ID,
+    TEXTS,
 )
 from semsig_gis.objects import objects_specs
 from semsig_gis.output.layers import LAYERS
@@ -30,6 +33,15 @@ FORM = form_of("""
 [Object]
 title = ["Class", "What it is."]
 symbol = ["Symbol", "Letter of its class."]
+name = ["Name", "Name that people read on it or know it by."]
+brand = ["Brand", "Brand on its sign."]
+operator = ["Operator", "Who operates it."]
+ref = ["Number on it", "Number or code that is written on it."]
+house_number = ["House number", "Number of its house."]
+street = ["Street", "Street of its address."]
+height = ["Height", "Above the ground.", "m", 1]
+group = ["Extended thing", "Points with the same number belong to one line or area."]
+family = ["Family", "Family of its class."]
 count = ["Objects", "How many objects of the source it stands for."]
 class_code = ["Class number", "Number of its class; a new object needs only this."]
 class_name = ["Class identifier", "Name of its class in catalogues."]
@@ -42,7 +54,7 @@ DISPLAY = Display(
     level=1,
     group="City",
     name="""coalesce("title", "class_name") || coalesce(' ' || "source_id", '')""",
-    tip=("source", "count"),
+    tip=("name", "brand", "ref", "street", "house_number", "source", "count"),
     nearer=6000,
 )
 
@@ -51,11 +63,21 @@ DISPLAY = Display(
 def objects_layer(objects: StreetObjects) -> Layer:
     """Return the layer of the street objects."""
     classes = {item.code: item for item in objects.taxonomy.classes}
-    texts = [SOURCE, SOURCE_ID, *([MERGED] if MERGED in objects.table.columns else [])]
+    present = [name for name in (*TEXTS, MERGED) if name in objects.table.columns]
+    texts = [SOURCE, SOURCE_ID, *present]
+    groups, heights = objects.groups, objects.heights
+    has_families = any(item.family for item in classes.values())
 
     def read(rows: slice) -> pa.Table:
         table = objects.table.iloc[rows]
         row_classes = [classes[code] for code in objects.codes[rows].tolist()]
+        more: dict[str, Any] = {}
+        if has_families:
+            more["family"] = [item.family for item in row_classes]
+        if heights is not None:
+            more[HEIGHT] = pa.array(heights[rows], mask=np.isnan(heights[rows]))
+        if groups is not None:
+            more[GROUP] = pa.array(groups[rows], mask=groups[rows] < 0)
         return pa.table(
             {
                 CLASS_CODE: objects.codes[rows],
@@ -63,6 +85,7 @@ def objects_layer(objects: StreetObjects) -> Layer:
                 CLASS_NAME: [item.name for item in row_classes],
                 "title": [item.title for item in row_classes],
                 **{name: pa.array(table[name].tolist(), pa.string()) for name in texts},
+                **more,
                 COUNT: table[COUNT].to_numpy(np.int32),
                 GEOMETRY: shapely.to_wkb(table.geometry.array),
             }

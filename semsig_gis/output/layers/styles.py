@@ -22,6 +22,8 @@ from semsig_gis.core import (
     RANK_RAMP,
     SHADES,
     class_signs,
+    codes_by_family,
+    family_named,
     percent,
 )
 
@@ -190,19 +192,25 @@ CELLS_OPACITY = 0.7
 
 
 def by_class(taxonomy: Taxonomy, codes: Iterable[int]) -> Style:
-    """Return a style of points by class code: the shape of the class with its pictogram."""
-    present = set(codes)
+    """Return a style of points by class code: the shape of the class with its pictogram.
+
+    Classes of several families are ordered by family, which their labels name.
+    """
+    signs, present = class_signs(taxonomy), set(codes)
+    families = codes_by_family(taxonomy, [code for code in signs if code in present])
     return Style(
         name="Classes",
         column="class_code",
         classes=tuple(
             StyleClass(
-                label=sign.title,
-                symbol=Symbol(colour=sign.colour, shape=sign.shape, sign=sign),
+                label=f"{family_named(family).title}: {signs[code].title}"
+                if len(families) > 1
+                else signs[code].title,
+                symbol=Symbol(colour=signs[code].colour, shape=signs[code].shape, sign=signs[code]),
                 value=str(code),
             )
-            for code, sign in class_signs(taxonomy).items()
-            if code in present
+            for family, members in families.items()
+            for code in members
         ),
     )
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import Companion, SignatureDatabase
 
 MOST_TYPES = 20  # objects that fit into a table
+NAMED = 20  # classes in a sentence, the commonest
 GROUP_LABELS = {"unique": "cells in a group of one", "entropy_bits": "entropy, in bits"}
 
 
@@ -54,7 +55,11 @@ def database_sentences(facts: Mapping[str, Any], *, symbols: bool = False) -> li
         "other cell sees."
     )
     items = sorted(facts["occurrences"], key=lambda item: -item["number"])
-    names = (class_label(item, symbols=symbols) for item in items if item["number"])
+    names = [class_label(item, symbols=symbols) for item in items if item["number"]]
+    more = len(names) - NAMED
+    # With symbols, they are all of use.
+    if more > 1 and not symbols:
+        names[NAMED:] = [f"and {more} more classes"]
     return [size, f"Seen: {', '.join(names)}."]
 
 

@@ -157,7 +157,8 @@ def test_objects_are_read_by_fiona_unchanged(file: Path) -> None:
     with fiona.open(file, layer="objects") as layer:
         assert layer.crs.to_epsg() == 32631
         assert list(layer.schema["properties"]) == [
-            *("class_code", "symbol", "class_name", "title", "source", "source_id", "count")
+            *("class_code", "symbol", "class_name", "title", "source", "source_id", "family"),
+            "count",
         ]
         read = list(layer)
     assert len(read) == len(OBJECTS) > 100
@@ -166,7 +167,7 @@ def test_objects_are_read_by_fiona_unchanged(file: Path) -> None:
         assert item.title.startswith(FORMULA)
         assert tuple(feature.properties.values()) == (
             *(item.code, item.symbol, item.name, item.title),
-            *row[["source", "source_id", "count"]],
+            *(*row[["source", "source_id"]], item.family, row["count"]),
         )
         assert feature.geometry.coordinates == (row.geometry.x, row.geometry.y)
 
@@ -376,7 +377,8 @@ def test_file_that_is_opened_during_the_export_is_unchanged(tmp_path: Path) -> N
 
 def test_objects_have_the_signs_of_their_classes() -> None:
     classes = paper_taxonomy().classes
-    taxonomy = Taxonomy((*classes[:-1], dataclasses.replace(classes[-1], name="stop_of_ours")))
+    ours = dataclasses.replace(classes[-1], name="stop_of_ours", family="")
+    taxonomy = Taxonomy((*classes[:-1], ours))
     root = ET.fromstring(renderer(by_class(taxonomy, [1, 5, 11]), "point"))  # noqa: S314 - our own
     by_name = {item.attrib["name"]: item for item in root.iter("symbol")}
     symbols = {

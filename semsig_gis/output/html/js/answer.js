@@ -4,9 +4,9 @@
 semsig.answerObjects = (about, signs) => {
   const {rays, rank, place} = about;
   const notes = {missed: "not said", false: "not there", misnamed: "of another class"};
-  const signOf = (symbol) => signs.classes[symbol] || semsig.anySign;
+  const signOf = ({symbol, title}) => signs.classes[symbol] || {...semsig.anySign, title};
   const nameOf = ({said, there, verdict}) => {
-    const {title} = signOf((there || said).symbol);
+    const {title} = signOf(there || said);
     return verdict === "matched" ? title : `${title} (${notes[verdict]})`;
   };
   let layer = null;
@@ -24,7 +24,7 @@ semsig.answerObjects = (about, signs) => {
     ctx.fillText(text, x, y);
   };
   const drawSign = (ctx, {said, there, verdict}, {x, y, size}, dark, isLit) => {
-    const sign = signOf((there || said).symbol);
+    const sign = signOf(there || said);
     const hollow = verdict === "missed" || verdict === "false";
     const ink = dark ? "#e9e9e6" : "#222";
     ctx.save();
@@ -127,8 +127,8 @@ semsig.answerObjects = (about, signs) => {
     const drawing = semsig.svg(cell, "svg", {
       viewBox: "-1.6 -1.6 3.2 3.2", class: verdict, "aria-hidden": "true"});
     semsig.drawFrame(drawing, signs.verdicts[verdict]);
-    semsig.drawSign(drawing, signOf(part.symbol), part.symbol);
-    cell.append(signOf(part.symbol).title);
+    semsig.drawSign(drawing, signOf(part), part.symbol);
+    cell.append(signOf(part).title);
     semsig.text(cell, "small", part.text);
     if (more) semsig.text(cell, "em", more);
   };

@@ -149,7 +149,9 @@ semsig.City = class {
       metres.push(nearest ? Math.round(nearest.metres) : null);
       return Math.round(nearest ? nearest.degrees : middle) % 360;
     });
-    return [types, bearings, {metres, reach: this.grid.reach, place: this.middle(cell)}];
+    const extents = Array.from(
+      this.data[`${name}.extents`]?.subarray(...this.part(name, cell)) || []);
+    return [types, bearings, {metres, extents, reach: this.grid.reach, place: this.middle(cell)}];
   }
   // The cells with the most similar counts of classes, best first: cell, difference, distance.
   mostSimilar(name, cell, count) {

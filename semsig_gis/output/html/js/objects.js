@@ -2,7 +2,7 @@
 semsig.layerSets = {};
 // Street objects of all classes on one canvas; `classLayer` returns the layer of one class.
 semsig.streetObjects = (key, packed, about) => {
-  const {classes, sources, fields} = about;
+  const {classes, sources, fields, texts} = about;
   const visible = new Set();
   const chunk = 256;
   let data = null;
@@ -19,7 +19,9 @@ semsig.streetObjects = (key, packed, about) => {
       item.starts = starts;
       item.boxes = semsig.blocks(data.x, data.y, starts);
     }
-    data.names = data.ids.map(semsig.plain);
+    const named = ["text.name", "text.brand"].filter((column) => column in texts);
+    data.names = data.ids.map((id, object) => semsig.plain(
+      [id, ...named.map((column) => data[column][object])].join("\n")));
     if (board) board.redraw();
   });
   // Radius of signs by zoom; large signs show the shape of the class, the largest its pictogram.
@@ -63,9 +65,12 @@ semsig.streetObjects = (key, packed, about) => {
       const size = sizeAt(map.getZoom());
       for (const number of about.order) {
         if (!visible.has(number)) continue;
-        const sprite = spriteOf(number, size, semsig.isDark(map), dots);
+        // Of an extended thing only one point has a large sign.
+        const [sprite, small] = [size, Math.min(size, 2.2)].map(
+          (radius) => spriteOf(number, radius, semsig.isDark(map), dots));
         const frame = semsig.frame(map, about);
-        within(frame, classes[number], min, max, (x, y) => stamp(sprite, x, y));
+        within(frame, classes[number], min, max, (x, y, object) =>
+          stamp(data.part?.[object] ? small : sprite, x, y));
       }
     });
   };
@@ -78,15 +83,18 @@ semsig.streetObjects = (key, packed, about) => {
   const showObject = (map, object) => {
     const {title} = classes[classOf(object)];
     const place = placeOf(object);
+    const read = Object.entries(texts).map(([column, label]) => [label, data[column][object]])
+      .filter(([, text]) => text);
     const values = [
-      title, sources[data.source[object]], data.ids[object],
+      title, ...read.map(([, text]) => text), sources[data.source[object]], data.ids[object],
       data.count[object] > 1 ? `${data.count[object]} rows of its source` : null,
       data.merged[object] || null,
       `${place.lat.toFixed(6)}, ${place.lng.toFixed(6)}`,
     ];
+    const rows = [fields[0], ...read.map(([label]) => label), ...fields.slice(1)];
     const mark = L.circleMarker(place, {pane: "shadowPane", interactive: false, fill: false,
       radius: 13, color: semsig.highlight, weight: 3});
-    semsig.show(map, semsig.details(title, fields, values, {}), place, {
+    semsig.show(map, semsig.details(title, rows, values, {}), place, {
       key: `object:${keyOf(object)}`, drawn: mark,
     });
   };
@@ -162,7 +170,7 @@ semsig.streetObjects = (key, packed, about) => {
     }));
     const byId = semsig.matches(data.names, words, limit).map(({rank, at: object}) => ({
       rank,
-      name: data.ids[object],
+      name: data["text.name"]?.[object] || data["text.brand"]?.[object] || data.ids[object],
       hint: `${classes[classOf(object)].title}, ${sources[data.source[object]]}`,
       show: (map) => {
         semsig.reveal(map, layers[classOf(object)], placeOf(object));
