@@ -291,6 +291,8 @@ class SimulatedDetector:
         names = np.cumsum(table.named(length)[kinds], axis=1)
         labels = (rng.random(len(detections))[:, None] * names[:, -1:] >= names).sum(axis=1)
         noise = rng.normal(0.0, table.sigma[kinds])
+        if detections.extents is not None:
+            noise += rng.uniform(-0.5, 0.5, len(kinds)) * detections.extents
         return replace(
             detections.renamed(table.codes[labels]),
             bearings=wrap_degrees(detections.bearings + noise),

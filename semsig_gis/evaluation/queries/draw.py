@@ -233,7 +233,10 @@ def _sights(
     parts = (slice(low, high) for low, high in pairwise(views.offsets.tolist()))
     return places, (
         Sight(
-            codes=views.codes[part], bearings=views.bearings[part], distances=views.distances[part]
+            codes=views.codes[part],
+            bearings=views.bearings[part],
+            distances=views.distances[part],
+            extents=None if views.extents is None else views.extents[part],
         )
         for part in parts
     )

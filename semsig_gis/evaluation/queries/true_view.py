@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     """Function that distorts a sight with random numbers of a generator."""
 
 NEAREST_M = 0.01  # least distance of an object, so that its width can be turned into an angle
-_BY_OBJECT = ("codes", "bearings", "distances", "false", "ranges", "scores")
+_BY_OBJECT = ("codes", "bearings", "distances", "extents", "false", "ranges", "scores")
 
 
 @dataclass(frozen=True, eq=False, repr=False, slots=True, kw_only=True)
@@ -50,6 +50,8 @@ class Sight(Displayed):
         Degrees clockwise from the assumed north, in [0, 360).
     distances : ndarray of float64, shape (n,)
         Metres; of a false object, how far away it seems to be.
+    extents : ndarray of float64, shape (n,), or None
+        Angular widths of extended things in degrees, 0 for points; None if there are none.
     heading : float, default 0
         Degrees to add to the bearings to have them from true north, in [0, 360).
     false : ndarray of bool, shape (n,), or None
@@ -75,6 +77,7 @@ class Sight(Displayed):
     codes: NDArray[np.uint8]
     bearings: NDArray[np.float64]
     distances: NDArray[np.float64]
+    extents: NDArray[np.float64] | None = None
     heading: float = 0.0
     false: NDArray[np.bool_] | None = None
     ranges: NDArray[np.float64] | None = None
@@ -115,6 +118,7 @@ class Sight(Displayed):
             codes=database.codes[part],
             bearings=database.bearing_units[part] * np.float64(FULL_TURN / BEARING_UNITS),
             distances=database.scale.metres[database.distance_units[part]],
+            extents=None if database.extents is None else database.extents[part],
         )
 
     def only(self, objects: ArrayLike) -> Sight:
@@ -146,6 +150,7 @@ class Sight(Displayed):
             "codes": codes,
             "bearings": bearings,
             "distances": distances,
+            "extents": np.zeros(len(codes)),
             "false": np.ones(len(codes), np.bool_),
             "ranges": np.maximum(distances, NEAREST_M),
             "scores": np.eye(CLASSES)[codes],
@@ -180,7 +185,7 @@ class CitySights:
     """Classes that are visible in a city and the range of sight, for drawing false objects.
 
     `codes` (k,) are the classes of `taxonomy` that are visible somewhere, ascending; `frequencies`
-    (k,) is how often each is seen; `reach` is the range of sight in metres.
+    (k,) is how often each is seen; `reach` is the range of sight in metres, without landmarks.
     """
 
     taxonomy: Taxonomy
@@ -196,7 +201,7 @@ class CitySights:
             taxonomy=database.taxonomy,
             codes=codes,
             frequencies=database.occurrences[codes],
-            reach=database.reach,
+            reach=database.near_reach,
         )
 
     def false_distances(self, count: int, rng: np.random.Generator) -> NDArray[np.float64]:

@@ -35,7 +35,7 @@ from semsig_gis.localization.likelihood.association import (
     near_pairs,
     sum_products,
 )
-from semsig_gis.localization.noise.table import NoiseTable, extent_sigma
+from semsig_gis.localization.noise.table import NoiseTable, extent_sigma, other_classes
 from semsig_gis.observation import View
 
 if TYPE_CHECKING:
@@ -67,7 +67,8 @@ FALLING_TREND = -3.0  # standard deviations; a lower trend means that detection 
 class Evidence:
     """The visible objects and the detections, photo by photo.
 
-    `names` are the k classes that occur, in the order of their codes in `start`, the first model.
+    `names` are the k classes that occur, in the order of their codes in `start`, the first model;
+    `families` are theirs, all empty if there are not several.
     `views` are the objects visible in each photo, `detections` the detections, and `pairs` the
     objects and detections that may be one thing. A photo of uncertain north is there several
     times, turned by different angles: `photos` are the numbers of the photos, and `log_weights` the
@@ -75,6 +76,7 @@ class Evidence:
     """
 
     names: list[str]
+    families: tuple[str, ...]
     start: NoiseTable
     views: VisibleObjects
     detections: Detections
@@ -197,11 +199,15 @@ def gather_evidence(
         )
     codes = np.unique(np.concatenate([views.codes, *names])).astype(np.uint8)
     codes = codes[codes != WILDCARD]
-    start = _starting_model(codes, taxonomy, radius, position_sigma)
+    families = tuple(taxonomy.by_code(code).family for code in codes.tolist())
+    if len({*families} - {""}) < 2:  # noqa: PLR2004 - families
+        families = ("",) * len(codes)
+    start = _starting_model(codes, families, taxonomy, radius, position_sigma)
     detections = Detections.of(detected, start)
     starts, bearings = detections.starts, detections.bearings
     return Evidence(
         names=[taxonomy.by_code(code).name for code in codes.tolist()],
+        families=families,
         start=start,
         views=views,
         detections=detections,
@@ -212,7 +218,11 @@ def gather_evidence(
 
 
 def _starting_model(
-    codes: NDArray[np.uint8], taxonomy: Taxonomy, radius: float, position_sigma: float
+    codes: NDArray[np.uint8],
+    families: Sequence[str],
+    taxonomy: Taxonomy,
+    radius: float,
+    position_sigma: float,
 ) -> NoiseTable:
     """Return a typical detector, with the given deviation of places in metres."""
     count = len(codes)
@@ -220,7 +230,7 @@ def _starting_model(
         codes=codes,
         missed=np.full((1, count), 0.25),
         misnamed=np.full((1, count), 0.1 if count > 1 else 0.0),
-        others=_others(count),
+        others=other_classes(families),
         clutter=np.full(count, 1.0 / count),
         sigma=np.full(count, 8.0),
         range_sigma=np.full(count, 0.25),
@@ -344,18 +354,24 @@ def _range_errors(
 def next_model(
     evidence: Evidence, totals: NDArray[np.float64], model: NoiseTable, *, fading: bool = False
 ) -> NoiseTable:
-    """Return the model of the totals, class rates shrunk towards the overall rate: the M step.
+    """Return the model of the totals: the M step.
 
-    With `fading`, detection falls with distance.
+    The rates of classes are shrunk towards those of their families, and these towards the overall
+    rate. With `fading`, detection falls with distance.
     """
-    size = len(evidence.names)
+    size, families = len(evidence.names), evidence.families
     names, false, turns, ranges, hits, trials = _columns(totals)
     detected = names.sum(axis=1)
     wrong = names * (1.0 - np.eye(size))
-    misnamed = np.clip(shrunk_rates(wrong.sum(axis=1), detected), LEAST, MOST)
-    spread = wrong + PRIOR_SAMPLES * misnamed[:, None] * _others(size)
-    shares = (false[:, 0] + PRIOR_SAMPLES / size) / (false.sum() + PRIOR_SAMPLES)
-    rates = np.clip(_rates_by_knot(hits, trials, fading=fading), LEAST, MOST)
+    misnamed = np.clip(shrunk_rates(wrong.sum(axis=1), detected, families), LEAST, MOST)
+    spread = wrong + PRIOR_SAMPLES * misnamed[:, None] * other_classes(families)
+    before = np.full(size, 1.0 / size)
+    if any(families):
+        equal = np.full(size, false.sum() / size)
+        before = _family_rates(false[:, 0], equal, families, prior=PRIOR_SAMPLES)
+        before /= before.sum()
+    shares = (false[:, 0] + PRIOR_SAMPLES * before) / (false.sum() + PRIOR_SAMPLES)
+    rates = np.clip(_rates_by_knot(hits, trials, families, fading=fading), LEAST, MOST)
     faded = [
         np.interp(model.scale.metres, KNOTS * limit, row / row[0])
         for limit, row in zip(model.ranges.tolist(), rates, strict=True)
@@ -366,8 +382,12 @@ def next_model(
         misnamed=misnamed[None] if size > 1 else np.zeros((1, 1)),
         others=spread / np.maximum(spread.sum(axis=1, keepdims=True), 1e-12),
         clutter=np.maximum(false.sum() / evidence.exposures.sum() * shares, LEAST / size),
-        sigma=np.clip(np.sqrt(shrunk_rates(*turns.T)), LEAST_SIGMA, MOST_SIGMA),
-        range_sigma=np.clip(np.sqrt(shrunk_rates(*ranges.T)), LEAST_ERROR, MOST_ERROR)
+        sigma=np.clip(
+            np.sqrt(shrunk_rates(turns[:, 0], turns[:, 1], families)), LEAST_SIGMA, MOST_SIGMA
+        ),
+        range_sigma=np.clip(
+            np.sqrt(shrunk_rates(ranges[:, 0], ranges[:, 1], families)), LEAST_ERROR, MOST_ERROR
+        )
         if ranges[:, 1].any()
         else model.range_sigma,
         fading=np.stack(faded) if fading else model.fading,
@@ -381,17 +401,22 @@ def _columns(totals: NDArray[np.float64]) -> list[NDArray[np.float64]]:
 
 
 def _rates_by_knot(
-    hits: NDArray[np.float64], trials: NDArray[np.float64], *, fading: bool
+    hits: NDArray[np.float64],
+    trials: NDArray[np.float64],
+    families: Sequence[str],
+    *,
+    fading: bool,
 ) -> NDArray[np.float64]:
     """Return the chance of detection by class and knot, shape (k, knots)."""
     if not fading:
-        rates = shrunk_rates(hits.sum(axis=1), trials.sum(axis=1))
+        rates = shrunk_rates(hits.sum(axis=1), trials.sum(axis=1), families)
         return np.broadcast_to(rates[:, None], hits.shape)
     # The shape of all classes together, scaled to the class, is its prior.
     overall = falling(hits.sum(axis=0), trials.sum(axis=0))
     expected = trials @ overall
     mean = PRIOR_SAMPLES * hits.sum() / trials.sum()
-    level = (hits.sum(axis=1) + mean) / (expected + mean)
+    before = _family_rates(hits.sum(axis=1), expected, families, prior=mean)
+    level = (hits.sum(axis=1) + mean * before) / (expected + mean)
     prior = np.clip(level[:, None] * overall, LEAST, MOST)
     rows = zip(hits + PRIOR_SAMPLES * prior, trials + PRIOR_SAMPLES, strict=True)
     return np.stack([falling(*row) for row in rows])
@@ -426,10 +451,35 @@ def detection_falls(evidence: Evidence, counts: Counts) -> bool:
     return bool(trend < FALLING_TREND * math.sqrt(variance))
 
 
-def shrunk_rates(hits: NDArray[np.number], trials: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rates of classes, each with `PRIOR_SAMPLES` trials at the overall rate added."""
+def shrunk_rates(
+    hits: NDArray[np.number], trials: NDArray[np.float64], families: Sequence[str] = ()
+) -> NDArray[np.float64]:
+    """Return the rates of classes, each with `PRIOR_SAMPLES` trials at the overall rate added.
+
+    A class of a family has them at the rate of the family, to which the same number is added.
+    """
     overall = hits.sum() / max(trials.sum(), 1e-9)
-    return np.asarray((hits + PRIOR_SAMPLES * overall) / (trials + PRIOR_SAMPLES))
+    added = PRIOR_SAMPLES * overall
+    before = _family_rates(hits, trials * overall, families, prior=added)
+    return np.asarray((hits + added * before) / (trials + PRIOR_SAMPLES))
+
+
+def _family_rates(
+    hits: NDArray[np.number],
+    expected: NDArray[np.float64],
+    families: Sequence[str],
+    *,
+    prior: float,
+) -> NDArray[np.float64]:
+    """Return how often the family of each class is hit, relative to what is expected.
+
+    The `prior` is added to both; classes without a family have 1.
+    """
+    rates = np.ones(len(hits))
+    for family in {*families} - {""}:
+        rows = np.array(families) == family
+        rates[rows] = (hits[rows].sum() + prior) / max(expected[rows].sum() + prior, 1e-9)
+    return rates
 
 
 def model_change(old: NoiseTable, new: NoiseTable) -> float:
@@ -447,11 +497,6 @@ def model_change(old: NoiseTable, new: NoiseTable) -> float:
     if len(old.codes) > 1:
         moves.append(np.log(new.misnamed) - np.log(old.misnamed))
     return max(float(np.abs(move).max()) for move in moves)
-
-
-def _others(size: int) -> NDArray[np.float64]:
-    """Return rows with the same chance for each other class."""
-    return np.asarray((1.0 - np.eye(size)) / max(size - 1, 1))
 
 
 def estimated_rates(

@@ -317,9 +317,10 @@ def learn_noise(
     -----
     The rate of a class with n samples and its own rate r is
     ``(n * r + 8 * overall) / (n + 8)``, so the overall rate counts for eight samples; the same
-    holds for squares of deviations. A row of the confusion has eight samples added that are
-    misnamed at the overall rate, each other class equally often. See `localization.learning.fit`
-    for the intervals.
+    holds for squares of deviations. If the classes are of several families, the rate of a class is
+    shrunk to that of its family in this way, and that of the family to the overall one. A row of
+    the confusion has eight samples added that are misnamed at this rate, as in `NoiseSpec`. See
+    `localization.learning.fit` for the intervals.
 
     Examples
     --------
@@ -488,14 +489,19 @@ def _spec(
     def by_class(values: NDArray[np.float64]) -> dict[str, float]:
         return dict(zip(evidence.names, values.tolist(), strict=True))
 
+    def with_families(values: NDArray[np.float64], quantity: str) -> dict[str, float]:
+        # Classes that no sample has are like the others of their family.
+        return _family_means(evidence, values, rates, quantity) | by_class(values)
+
     clutter = float(model.clutter.sum())
     trials = rates[(rates["class"] != ALL) & (rates["quantity"] == "detection")]["samples"]
     weights = np.maximum(trials.to_numpy(), LEAST)
     near = np.average(1.0 - model.missed[0], weights=weights)
     spec = NoiseSpec(
         detection=float(near) if fading else overall["detection"],
-        detection_by_class=by_class(1.0 - model.missed[0]),
+        detection_by_class=with_families(1.0 - model.missed[0], "detection"),
         misnamed=overall["misnamed"],
+        misnamed_by_class=_family_means(evidence, model.misnamed[0], rates, "misnamed"),
         confusion={
             name: by_class(row / row.sum())
             for name, row in zip(evidence.names, model.named(0), strict=True)
@@ -503,13 +509,13 @@ def _spec(
         clutter=clutter,
         clutter_shares=by_class(model.clutter / clutter),
         bearing_sigma=overall["bearing_sigma"],
-        bearing_sigma_by_class=by_class(model.sigma),
+        bearing_sigma_by_class=with_families(model.sigma, "bearing_sigma"),
         position_sigma=model.position_sigma,
         repeat=REPEAT if (evidence.detections.turns < 1.0).any() else 1.0,
         name=name,
     )
     if "range_sigma" in overall:
-        errors = by_class(model.range_sigma)
+        errors = with_families(model.range_sigma, "range_sigma")
         spec = replace(spec, range_sigma=overall["range_sigma"], range_sigma_by_class=errors)
     if fading:
         shares = fading_at_knots(model)
@@ -522,3 +528,17 @@ def _spec(
         }
         spec = replace(spec, fading=points)
     return spec
+
+
+def _family_means(
+    evidence: Evidence, values: NDArray[np.float64], rates: pd.DataFrame, quantity: str
+) -> dict[str, float]:
+    """Return the mean value of the classes of each family, weighted by their samples."""
+    rows = rates[(rates["class"] != ALL) & (rates["quantity"] == quantity)]
+    weights = np.maximum(rows["samples"].to_numpy(), LEAST)
+    names = np.array(evidence.families)
+    return {
+        family: float(np.average(values[names == family], weights=weights[names == family]))
+        for family in dict.fromkeys(evidence.families)
+        if family
+    }

@@ -83,8 +83,14 @@ class PhotoTable:
         unknown = np.full(size, math.nan)
         ranges = unknown if photo.ranges is None else photo.ranges
         ranged = ~np.isnan(ranges)
-        disc = np.where(ranged, 2.0 * (np.where(ranged, ranges, 1.0) / table.scale.reach) ** 2, 1.0)
         scores = name_scores(photo, table)
+        # False objects may be anywhere in the disc; with landmarks, in that of the class.
+        radii = np.full(size, table.scale.reach)
+        if table.scale.logarithmic:
+            weights = table.clutter[:, None] * scores
+            squares = (weights / table.ranges[:, None] ** 2).sum(axis=0) / weights.sum(axis=0)
+            radii = 1.0 / np.sqrt(squares)
+        disc = np.where(ranged, 2.0 * (np.where(ranged, ranges, 1.0) / radii) ** 2, 1.0)
         errors = unknown if photo.range_errors is None else photo.range_errors
         rough = np.zeros(size) if photo.bearing_errors is None else photo.bearing_errors
         (look,) = photo.photos

@@ -90,7 +90,13 @@ class NoiseTable:
         if self.position_sigma == 0:
             return np.ones((len(self.codes), DISTANCE_UNITS + 1))
         ranges, row_of = np.unique(self.ranges, return_inverse=True)  # most classes have the same
-        beyond = (self.distances - ranges[:, None]) / (self.position_sigma * math.sqrt(2.0))
+        distances = np.broadcast_to(self.distances, (len(ranges), len(self.distances)))
+        if self.scale.logarithmic:
+            # Units are wide far away: the mean distance of the objects in them that are in range.
+            half = self.scale.rounding(distances)
+            nearest, farthest = distances - half, np.minimum(distances + half, ranges[:, None])
+            distances = np.maximum((nearest + farthest) / 2.0, nearest)
+        beyond = (distances - ranges[:, None]) / (self.position_sigma * math.sqrt(2.0))
         return np.asarray(0.5 * np.vectorize(math.erfc, otypes=[np.float64])(beyond))[row_of]
 
     @cached_property

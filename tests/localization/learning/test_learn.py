@@ -15,11 +15,12 @@ from sentences import refused
 from view_oracle import random_view
 from worlds import CODES, World
 
-from semsig_gis.core import InputError, Signature, wilson_interval
+from semsig_gis.core import InputError, Signature, Taxonomy, wilson_interval
 from semsig_gis.database import visible_objects_in
 from semsig_gis.localization import (
     ALL,
     Sample,
+    database_tables,
     estimated_rates,
     expected_counts,
     extrapolated,
@@ -472,3 +473,35 @@ def test_the_overall_rate_counts_for_eight_samples() -> None:
     rates = shrunk_rates(np.array([0.0, 90.0]), np.array([10.0, 90.0]))
     assert rates == pytest.approx([8 * 0.9 / 18, (90 + 8 * 0.9) / 98])
     assert shrunk_rates(np.zeros(2), np.zeros(2)).tolist() == [0.0, 0.0]
+
+
+def test_rare_classes_share_what_is_learned_of_their_family() -> None:
+    hits, trials = np.array([0.0, 90.0, 10.0, 0.0]), np.array([1.0, 100.0, 100.0, 0.0])
+    families = ("shop", "shop", "food", "food")
+    rates = shrunk_rates(hits, trials, families)
+    overall = 100.0 / 201.0
+    shop, food = ((part + 8 * overall) / (total + 8) for part, total in ((90, 101), (10, 100)))
+    expected = [8 * shop / 9, (90 + 8 * shop) / 108, (10 + 8 * food) / 108, food]
+    assert rates == pytest.approx(expected)
+    assert (shrunk_rates(hits, trials, ("",) * 4) == shrunk_rates(hits, trials)).all()
+
+
+def test_what_is_learned_of_a_family_is_for_its_other_classes() -> None:
+    families = ["shop", "shop", "food", "food", "food", *["shop"] * 6]
+    classes = zip(TAXONOMY.classes, families, strict=True)
+    taxonomy = Taxonomy(tuple(replace(item, family=family) for item, family in classes))
+    database = replace(random_database(8, cells=120, classes=4), taxonomy=taxonomy)
+    samples = []
+    for cell in range(len(database)):
+        view = View.of(database.signature(cell))
+        codes = view.class_scores().argmax(axis=1)
+        # Half of the shops are overlooked.
+        kept = (codes > 2) | (np.arange(len(codes)) % 2 == 0)
+        samples.append(Sample(signature=view.select(kept), cell_id=int(database.cell_ids[cell])))
+    spec = learn_noise(samples, database).spec
+    shop, food = (spec.detection_by_class[family] for family in ("shop", "food"))
+    assert shop < 0.7
+    assert food > 0.9
+    # The classes 5 and 6 were not in the samples.
+    (table,), _ = database_tables(replace(database, codes=database.codes + np.uint8(2)), spec)
+    assert (1.0 - table.missed[0, 2:]).tolist() == pytest.approx([food, shop])
