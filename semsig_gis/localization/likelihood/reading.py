@@ -507,6 +507,7 @@ class _Reader:
         texts = dict.fromkeys(filter(None, (*query.text_rows, *query.signs)))
         self.objects = {text: self.names.objects.fits(text) for text in texts}
         self.streets = {text: self.names.streets.fits(text) for text in texts}
+        self.signs: list[str] = []
 
     @property
     def reading(self) -> Reading:
@@ -514,7 +515,7 @@ class _Reader:
         query = self.query
         used = [self._is_on_object(row, text) for row, text in enumerate(query.text_rows)]
         others = [text for text, on in zip(query.text_rows, used, strict=True) if text and not on]
-        signs = [text for text in (*others, *query.signs) if self._fits_any(text)]
+        self.signs = [text for text in (*others, *query.signs) if self._fits_any(text)]
         usable = query.among(self.index.database.present_codes)
         rows = np.flatnonzero(usable | np.array(used, np.bool_))
         texts = tuple(text if on else "" for text, on in zip(query.text_rows, used, strict=True))
@@ -524,7 +525,7 @@ class _Reader:
             view=view,
             rows=rows,
             index=self.index,
-            extra=np.sum([self._sign(text) for text in signs], axis=0) if signs else None,
+            extra=np.sum(list(map(self._sign, self.signs)), axis=0) if self.signs else None,
             records=tuple(map(self._record, self.objects)),
             notes=tuple(self._unknown(text) for text in self.objects if not self._fits_any(text)),
         )
@@ -589,7 +590,8 @@ class _Reader:
     def _record(self, text: str) -> TextRecord:
         """Return what a text fits best."""
         street, other = self.streets[text], self.objects[text]
-        kind, fits = ("street", street) if street.best > other.best else ("object", other)
+        on_street = street.best > other.best or (text in self.signs and street.best == other.best)
+        kind, fits = ("street", street) if on_street else ("object", other)
         return {
             "text": text,
             "fit": IN_WORDS[fits.best],
