@@ -25,7 +25,7 @@ from semsig_gis.core import (
 from semsig_gis.observation import GRID_NORTH, NorthRecord, View, ViewRecord
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     import geopandas as gpd
     import pandas as pd
@@ -240,13 +240,18 @@ def check_top(top: int) -> None:
         raise InputError(f"{top} candidates were asked for; give a whole number from 1.")
 
 
-def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tuple[str, ...]:
+def query_notes(
+    query: Signature, present: ArrayLike, taxonomy: Taxonomy, *, texts: Collection[str] = ()
+) -> tuple[str, ...]:
     """Return warnings about the objects of a query, such as classes that the database lacks.
 
-    `present` are the class codes that occur in the database.
+    `present` are the class codes that occur in the database. Objects with one of the `texts`, which
+    fit the map, are used whatever their class.
     """
     notes = query.notes if isinstance(query, View) else ()
     if not len(query):
+        if texts:
+            return notes
         return ("nothing was seen, which says little about the place.", *notes)
     words = [taxonomy.title_of(name).lower() for name in View.of(query).class_names(taxonomy)]
     if isinstance(query, View) and query.bearings is not None and len(outside := query.outside()):
@@ -258,7 +263,10 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
             "at; the heading, the field of view or the bearing may be wrong."
         )
         notes = (note, *notes)
-    lacking = [words[row] for row in np.flatnonzero(~query.among(present)).tolist()]
+    usable = query.among(present)
+    if texts and isinstance(query, View):
+        usable |= np.array([text in texts for text in query.text_rows], np.bool_)
+    lacking = [words[row] for row in np.flatnonzero(~usable).tolist()]
     if not lacking:
         return notes
     names = " and no ".join(dict.fromkeys(lacking))

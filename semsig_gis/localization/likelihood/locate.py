@@ -678,7 +678,12 @@ class LikelihoodLocator:
             taxonomy=database.taxonomy,
             licenses=answer_licenses(database, city),
             notes=(
-                *query_notes(query, database.present_codes, database.taxonomy),
+                *query_notes(
+                    query,
+                    database.present_codes,
+                    database.taxonomy,
+                    texts=[record["text"] for record in reading.records if record["names"]],
+                ),
                 *reading.notes,
                 *_prior_notes(ratio),
                 *self.north.notes,

@@ -182,6 +182,7 @@ def test_text_on_a_thing_of_a_class_that_is_not_there_is_used() -> None:
     code = next(item.code for item in TAXONOMY.classes if item.code not in {TREE, LAMP, BENCH})
     other = replace(_seen(6, "Kiosk ggggg"), codes=np.array([code], np.uint8))
     near = _near_object(6)
+    assert not _answer(other).notes
     assert _odds(_answer(other), near) > 3.0 * _odds(_answer(replace(other, texts=None)), near)
 
 
@@ -293,6 +294,7 @@ def test_name_of_a_street_is_evidence_along_the_street() -> None:
     nothing = View(np.empty(0, np.uint8), np.empty(0))
     answer = locate(index, replace(nothing, signs=("R. du Pau",)), store=store)
     assert answer.to_dict()["texts"][0]["kind"] == "street"
+    assert not answer.notes
     chances = answer.chances[_near_street(20.0)].sum()
     assert chances > 0.8
     assert (
