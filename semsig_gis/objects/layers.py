@@ -27,6 +27,7 @@ from semsig_gis.core import (
     Displayed,
     EmptyResultError,
     InputError,
+    SignatureSpec,
     Taxonomy,
     crs_text,
     map_with,
@@ -664,13 +665,19 @@ def assemble(
 
 
 def _taxonomy_of(catalog: Catalog, layers: Sequence[RawLayer]) -> Taxonomy:
-    """Return the classes of a catalogue, without landmarks that no layer has.
+    """Return the classes of a catalogue, without those that are seen from far and no layer has.
 
-    A database with landmarks, which are seen from far away, has coarser distances.
+    The longest range decides how coarsely a database stores distances.
     """
     names = {name for layer in layers for name in layer.spec.classes}
-    classes = catalog.taxonomy.classes
-    return Taxonomy(tuple(item for item in classes if not item.tall or item.name in names))
+    usual = SignatureSpec().radius
+    return Taxonomy(
+        tuple(
+            item
+            for item in catalog.taxonomy.classes
+            if item.name in names or (item.range_m or usual) <= usual
+        )
+    )
 
 
 def _unread(
