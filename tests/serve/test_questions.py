@@ -252,6 +252,21 @@ def test_command_line_returns_the_same_answer(
     assert answer["estimate"]["place"] == pytest.approx(place, abs=1e-6)
 
 
+def test_families_and_texts_of_marks_are_part_of_the_question(page: Page) -> None:
+    marks = [
+        {"class": "furniture", "bearing": 10.0, "range": None},
+        {"class": "bench", "bearing": 50.0, "range": None, "text": "Rue de l'École"},
+    ]
+    answer = page.ask("/api/answer", {"views": [{"compass": marks, "heading_error": None}]})
+    (view,) = answer["views"]
+    assert len(view["scores"][0]) > 10
+    assert view["texts"] == ["", "Rue de l'École"]
+    assert "Rue de l" in answer["command"]
+    words = {item["name"]: item["words"] for item in page.ask("/api/city")["classes"]}
+    assert {"bench", "banc", "bank"} <= {*words["bench"]}
+    assert page.ask("/api/city")["families"] == []  # there is only one
+
+
 @pytest.mark.parametrize("quick", [True, False])
 def test_known_place_raises_its_chance(page: Page, *, quick: bool) -> None:
     bench = page.bench

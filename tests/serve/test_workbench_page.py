@@ -519,6 +519,57 @@ def test_view_is_composed_on_a_compass(workbench: WorkbenchPage) -> None:
     assert workbench.ask("return semsig.session.views[0].step") is None
 
 
+# A second family, as of a city with more classes.
+FAMILIES = """
+const {session} = semsig;
+const [bench, ...others] = session.city.classes;
+bench.family = "shop";
+bench.words = ["bakery", "boulangerie"];
+const family = (name, heading) => ({...bench, symbol: undefined, name, heading, words: ["store"],
+  title: `Any of ${heading.toLowerCase()}`});
+session.city.families = [family("shop", "Shops"), family("furniture", "Street furniture")];
+semsig.palette(session);
+return [bench.name, bench.title];
+"""
+
+
+def test_classes_are_found_by_family_and_words_and_texts_are_kept(workbench: WorkbenchPage) -> None:
+    name, title = workbench.ask(FAMILIES)
+    workbench.press("#add-compass")
+    workbench.ask("document.getElementById('several').open = true")
+    headings = ["Seen most often", "Shops", "Street furniture"]
+    assert [part.text for part in workbench.all("#palette summary")] == headings
+    workbench.one("#palette-search").send_keys("boulang")
+    assert [button.text for button in workbench.all("#palette button")] == [
+        "Ask at each mark",
+        title,
+    ]
+    workbench.one("#palette-search").clear()
+    workbench.one("#palette-search").send_keys("store")
+    workbench.brush("shop")
+    workbench.press("#add-mark")
+    marks = "return semsig.session.entries.map((entry) => [entry.class, entry.text ?? null])"
+    assert workbench.ask(marks) == [["shop", None]]
+    workbench.one("#text").send_keys("Boulangerie P", Keys.TAB)
+    workbench.settle()
+    assert workbench.ask(marks) == [["shop", "Boulangerie P"]]
+    assert "\u201cBoulangerie P\u201d" in workbench.text("#marks")
+    assert "Boulangerie P" in workbench.ask("return JSON.stringify(semsig.session.saved().views)")
+    workbench.press("#undo")
+    assert workbench.ask(marks) == [["shop", None]]
+    workbench.press("#redo")
+    assert workbench.ask(marks) == [["shop", "Boulangerie P"]]
+    # The menu at a mark has the same families.
+    workbench.ask("semsig.askClass(semsig.session, semsig.session.entries[0])")
+    menu = workbench.ask(
+        "return [...document.querySelectorAll('#class-list > *')].map((line) => line.textContent)"
+    )
+    assert menu[0] == "Seen most often"
+    assert menu[menu.index("Shops") + 1 : menu.index("Street furniture")] == ["Any of shops", title]
+    workbench.type(Keys.ESCAPE)
+    assert name in workbench.ask("return semsig.kindsLike(semsig.session, 'bakery')[0].name")
+
+
 def test_view_is_simulated_with_noise(workbench: WorkbenchPage, page: Page) -> None:
     database = page.bench.database
     place = to_latlon(database.xy[[PLACE]], database.crs)[0].tolist()

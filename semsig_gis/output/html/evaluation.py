@@ -209,7 +209,7 @@ def _query_details(
     best_rows = np.searchsorted(database.cell_ids, best_ids).tolist()
     next_places, next_errors = _next_cells(evaluation, database)
     cell_places = to_latlon(database.xy, database.crs).tolist()
-    reach = database.near_reach
+    radius_m = database.near_reach
     bearings = evaluation.query_bearings
     details = []
     for number, query in enumerate(evaluation.queries.itertuples(index=False)):
@@ -222,9 +222,11 @@ def _query_details(
             row = {name: getattr(query, f"query_{name}") for name in names}
             view = parse_view(row, taxonomy=database.taxonomy)
         signature = (
-            panel_signature(query.query_types, bearings[number], kind="query", reach=reach, **look)
+            panel_signature(
+                query.query_types, bearings[number], kind="query", reach=radius_m, **look
+            )
             if view is None
-            else query_signature(view, database.taxonomy, radius=reach, **look)
+            else query_signature(view, database.taxonomy, radius=radius_m, **look)
         )
         true_row, best_row = rows[number], best_rows[number]
         values = [

@@ -13,7 +13,7 @@ import shapely
 from folium.raster_layers import ImageOverlay
 from map_pages import IMAGES, LEGEND, titles
 from small_city import chances_of
-from worlds import CODES, TAXONOMY, random_town
+from worlds import CODES, TAXONOMY, many_classes, objects_of, random_town
 
 from semsig_gis.core import OBJECT_COLOURS, SAME_LEVELS, SAME_TYPES
 from semsig_gis.database import build_database, compare_cells
@@ -305,3 +305,54 @@ def test_drift_map_of_no_and_of_all_changes() -> None:
         assert len(images) == 1
         names = [getattr(child, "layer_name", "") for child in layers_of(map_).values()]
         assert not any(name.startswith("Objects") for name in names)
+
+
+WHEEL = """
+const [symbols, bearings, metres, extents] = arguments;
+const classes = Object.fromEntries([...symbols].map((symbol) => [symbol, {
+  title: symbol, colour: "#888888", ink: "#ffffff", drop: 0, outline: semsig.disc,
+  pictogram: semsig.disc}]));
+const figure = semsig.wheel("Here", [symbols, bearings, {metres, extents, reach: 100}], {classes});
+const at = (sign) => /translate\\(([^,]+),([^)]+)\\) scale\\(([^)]+)/.exec(
+  sign.getAttribute("transform")).slice(1).map(Number);
+return [
+  [...figure.querySelectorAll(".object > g")].map(at),
+  [...figure.querySelectorAll(".extent")].length,
+  [...figure.querySelectorAll(".object > text")].map(({textContent}) => textContent)];
+"""
+
+
+def test_many_objects_of_a_wheel_do_not_hide_each_other(ambiguity_page: MapPage) -> None:
+    count = 40
+    rng = np.random.default_rng(2)
+    bearings = np.sort(rng.integers(0, 360, count))
+    metres = rng.integers(2, 100, count)
+    metres[[3, 20]] = 150, 1_240
+    extents = np.where(np.arange(count) == 7, 60, 0)
+    symbols = "".join(map(chr, range(0x410, 0x410 + count)))
+    places, arcs, lengths = ambiguity_page.ask(
+        WHEEL, symbols, bearings.tolist(), metres.tolist(), extents.tolist()
+    )
+    xy, size = np.array(places)[:, :2], places[0][2]
+    turned = np.degrees(np.arctan2(xy[:, 0], -xy[:, 1])) % 360.0
+    assert np.abs((turned - bearings + 180.0) % 360.0 - 180.0).max() < 0.1
+    away = np.hypot(*(xy[:, None] - xy[None]).T) + np.where(np.eye(count), 999.0, 0.0)
+    assert np.mean(away.min(axis=0) >= 1.6 * size) > 0.8
+    out = np.hypot(*xy.T)
+    assert out[[3, 20]].min() > 54.0 > np.delete(out, [3, 20]).max()
+    assert (arcs, lengths) == (1, ["150 m", "1.2 km"])
+
+
+def test_symbols_beyond_ascii_are_read_from_their_codes(page: MapPage) -> None:
+    kinds = many_classes(1)
+    things = [
+        (*xy, item.code, "world", item.name)
+        for xy, item in zip(random_town().street_objects.xy.tolist(), kinds.classes, strict=False)
+    ]
+    licences = random_town().street_objects.licenses
+    city = build_database(objects_of(*things, licenses=licences, taxonomy=kinds))
+    page.open(ambiguity_map(city))
+    cell = int(city.lengths.argmax())
+    page.click(city, cell)
+    assert page.classes("It sees") == titles(city, city.types(cell))
+    assert not city.types(cell).isascii()

@@ -416,3 +416,13 @@ def test_many_classes_are_listed_by_family_and_a_box_switches_a_family(page: Map
     page.ask("document.querySelector('[data-group=\"objects:shop\"] input').click()")
     assert page.ask(f"return [{box}.checked, {box}.indeterminate]") == [True, True]
     assert page.drawn(shop.colour, BOARD) > 0
+
+
+def test_names_of_objects_are_shown_and_found(page: MapPage) -> None:
+    names = [f"Caf\u00e9 {row}" if row == NUMBER else "" for row in range(len(OBJECTS))]
+    table = OBJECTS.table.assign(name=names, house_number="12 b")
+    page.open(objects_map(dataclasses.replace(OBJECTS, table=table)))
+    assert page.search(f"cafe {NUMBER}", Keys.ENTER)[0].startswith(f"Caf\u00e9 {NUMBER}")
+    text = page.panel()
+    assert f"Name\tCaf\u00e9 {NUMBER}" in text
+    assert "House number\t12 b" in text

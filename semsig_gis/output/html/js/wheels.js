@@ -32,8 +32,8 @@ semsig.entries = (types, bearings, look = {}, classes = {}) => bearings.map((deg
   const title = types ? (classes[types[at]] || semsig.anySign).title : null;
   return `${title ? `${title}\u00a0` : ""}${degrees}\u00b0${far}${wide}${outside}`;
 });
-// The share of the radius of a wheel at which an object is drawn that is so many metres away: to
-// scale up to 60 m, and logarithmic beyond, so that near objects keep their room.
+// The distance of an object from the middle of a wheel, as a share of its radius: to scale if the
+// wheel reaches to 60 m, and logarithmic if it reaches farther, so that near objects keep their room.
 semsig.share = (metres, reach) =>
   (reach > 60 ? Math.log1p(metres / 10) / Math.log1p(reach / 10) : metres / reach);
 // The metres of a share of the radius, the inverse.
