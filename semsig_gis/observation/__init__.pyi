@@ -46,6 +46,7 @@ from .sentences import mappings as mappings
 from .sentences import parse_seen as parse_seen
 from .sentences import parse_view as parse_view
 from .sentences import text_row as text_row
+from .spoken import ANY_ERROR as ANY_ERROR
 from .spoken import read_sentence as read_sentence
 from .track import read_track as read_track
 from .view import CLASSES as CLASSES

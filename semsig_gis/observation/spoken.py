@@ -621,13 +621,14 @@ class _Part:
             self._leave_out(vocabulary)
         else:
             raise _absent_unnamed(self.text)
-        if self.fault is not None:
-            return
-        if not self.codes:
-            raise InputError(
+        if self.fault is None and not self.codes:
+            self.lost = "it names several things; put a comma between them"
+            self.fault = InputError(
                 f"{self.text!r} names several things; put a comma between them, and give each its "
                 "own direction."
             )
+        if self.fault is not None:
+            return
         if self.absent and WILDCARD in self.codes:
             raise _absent_unnamed(self.text)
         placed = self.says_where or self.near

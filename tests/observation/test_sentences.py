@@ -453,6 +453,11 @@ def test_things_that_only_other_maps_have_are_not_used(text: str, word: str) -> 
         ("tree stump left, lamp right", ["street_light +90"], ["'stump' is not understood"]),
         ("no smoking sign, lamp left", ["street_light -90"], ["'smoking' is not understood"]),
         (
+            "school fence at 10, bench at 20",
+            ["bench at 20"],
+            ["'school fence at 10' was not used, because it names several things"],
+        ),
+        (
             "lamp at 10, bench next to the blorb",
             ["bench", "street_light at 10"],
             ["'the blorb' was not used"],

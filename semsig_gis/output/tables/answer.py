@@ -11,7 +11,7 @@ import numpy as np
 
 from semsig_gis.core import Table, figure, percent, signed_degrees, to_degrees
 from semsig_gis.localization import VERDICTS, Location
-from semsig_gis.observation import GRID_NORTH, View
+from semsig_gis.observation import ANY_ERROR, GRID_NORTH, View
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -321,7 +321,8 @@ def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
         error = math.nan if view.bearing_errors is None else view.bearing_errors[row]
         spread = "" if math.isnan(error) else f" ± {error:.2g}°"
         photo = view.photos[int(view.photo_rows[row])]
-        parts.append(f"{_direction(float(view.bearings[row]), photo)}{spread}")
+        direction = f"{_direction(float(view.bearings[row]), photo)}{spread}"
+        parts.append("somewhere" if error >= ANY_ERROR else direction)
     if view.ranges is not None and not math.isnan(view.ranges[row]):
         parts.append(f"{view.ranges[row]:.2g} m away")
     if text := view.text_rows[row]:
