@@ -23,7 +23,7 @@ ENTRANCE = "entrance"
 # What is less deep inside of a building is at its wall already.
 WALL_M = 0.5
 # Walls are considered at points this far apart.
-STEP_M = 1.0
+STEP_M = 2.0
 # An entrance this near to a front is used instead.
 ENTRANCE_M = 5.0
 # A metre between a wall and the edge of the street counts as many metres inside the building.
@@ -63,7 +63,7 @@ def moved_to_fronts(
     pair_object = np.repeat(np.arange(len(rows)), counts)
     pair_wall = np.arange(counts.sum()) + np.repeat(start - np.cumsum(counts) + counts, counts)
     metres = np.hypot(*(objects.xy[rows][pair_object] - walls.places[pair_wall]).T)
-    to_street = np.minimum(street_distances(walls.places, streets), MOST_STREET_M)
+    to_street = street_distances(walls.places, streets)
     metres += STREET_WEIGHT * to_street[pair_wall]
     best = _first_of_each(pair_object, metres)
     rows, front = rows[pair_object[best]], pair_wall[best]
@@ -147,17 +147,25 @@ def _free_walls(
 def street_distances(
     places: NDArray[np.float64], streets: gpd.GeoDataFrame | None
 ) -> NDArray[np.float64]:
-    """Return the distance of places, shape (n, 2), to the edge of the nearest street, or 0."""
+    """Return the distance of places, shape (n, 2), to the edge of the nearest street.
+
+    It is at most 15 m, also farther away, and 0 if there are no streets.
+    """
     if streets is None or not len(streets):
         return np.zeros(len(places))
     tree = shapely.STRtree(streets.geometry.to_numpy())
-    place, street, metres = _nearest(tree, places)
     half = np.full(len(streets), np.nan)
     if HALF_WIDTH in streets:
         half = streets[HALF_WIDTH].to_numpy(np.float64)
     half = np.where(np.isnan(half), HALF_WIDTH_M, half)
-    result = np.zeros(len(places))
-    result[place] = np.maximum(metres - half[street], 0)
+    (place, street), metres = tree.query_nearest(
+        shapely.points(places),
+        max_distance=MOST_STREET_M + half.max(),
+        all_matches=False,
+        return_distance=True,
+    )
+    result = np.full(len(places), MOST_STREET_M)
+    result[place] = np.clip(metres - half[street], 0, MOST_STREET_M)
     return result
 
 

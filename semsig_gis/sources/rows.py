@@ -489,6 +489,8 @@ class RowRules:
         for key, column in uses:
             require_field(column, fields, where=where, key=key)
         self.fields = tuple(dict.fromkeys(column for _, column in uses))
+        facts = {"texts", "height_field", "levels_field"}
+        self._rule_fields = {column for key, column in uses if key not in facts}
 
     def apply(self, rows: Rows) -> FilteredRows:
         """Return the columns of a `RawLayer` for the rows that pass.
@@ -498,7 +500,9 @@ class RowRules:
         id of another row.
         """
         spec, size = self.spec, len(rows.numbers)
-        columns = {field: _CodedColumn(rows.column(field)) for field in self.fields}
+        # Most layers of OpenStreetMap have no values in most of the fields.
+        fields = [field for field in self.fields if self._matters(field, rows)]
+        columns = {field: _CodedColumn(rows.column(field)) for field in fields}
         passed = np.ones(size, bool)
         for field, condition in self._where:
             passed &= columns[field].map(condition.accepts, bool)
@@ -542,6 +546,11 @@ class RowRules:
             notes=tuple(notes),
         )
 
+    def _matters(self, field: str, rows: Rows) -> bool:
+        """Whether a field has a value in any row, or is not only one of texts or heights."""
+        values = rows.columns[field]
+        return not isinstance(values, list) or bool(values) or field in self._rule_fields
+
     def _facts(self, columns: Mapping[str, _CodedColumn], size: int) -> dict[str, pa.Array]:
         """Return the columns other than class and identifier."""
         spec, result = self.spec, {}
@@ -550,6 +559,8 @@ class RowRules:
         if spec.name_field is not None:
             result[NAME] = _texts(columns, spec.name_field, size)
         for column, field in spec.texts:
+            if field not in columns:
+                continue
             texts = _texts(columns, field, size)
             if pc.any(pc.not_equal(texts, "")).as_py():
                 result[column] = texts
@@ -576,9 +587,9 @@ class RowRules:
         """Return the heights in metres, from the storeys where only these are known, or NaN."""
         own, levels = self.spec.height_field, self.spec.levels_field
         heights = np.full(size, math.nan)
-        if levels is not None:
+        if levels is not None and levels in columns:
             heights = STOREY_M * columns[levels].map(_metres, float)
-        if own is not None:
+        if own is not None and own in columns:
             stated = columns[own].map(_metres, float)
             heights = np.where(np.isnan(stated), heights, stated)
         plausible = (heights > 0) & (heights <= MAX_HEIGHT_M)
