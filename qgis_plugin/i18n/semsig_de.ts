@@ -576,6 +576,10 @@
         <translation>Filter des Katalogs</translation>
     </message>
     <message>
+        <source>Find a class</source>
+        <translation>Klasse suchen</translation>
+    </message>
+    <message>
         <source>Find the place</source>
         <translation>Ort suchen</translation>
     </message>

@@ -576,6 +576,10 @@
         <translation>Filtres du catalogue</translation>
     </message>
     <message>
+        <source>Find a class</source>
+        <translation>Chercher une classe</translation>
+    </message>
+    <message>
         <source>Find the place</source>
         <translation>Trouver le lieu</translation>
     </message>

@@ -20,6 +20,8 @@ __all__ = ["CompassDial", "Mark", "Sign", "sign_icon"]
 MARGIN, DISC = 18.0, 10.0  # pixels
 PICTURE = 0.65  # half of the side of a pictogram, in radii of its disc
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16"><path d="{}" fill="{}"/></svg>'
+CROWD, SMALLEST = 16, 6.0  # marks, from which their discs are smaller; pixels
+FAR_REACH = 60.0  # metres, beyond which distances are drawn on a logarithmic scale
 RINGS = (0.33, 0.66, 1.0)  # shares of the radius
 
 
@@ -77,6 +79,10 @@ def paint_sign(painter: QPainter, sign: Sign, place: QPointF, radius: float = DI
     painter.setFont(font)
     box = QRectF(place.x() - radius, place.y() - radius, 2 * radius, 2 * radius)
     painter.drawText(box, Qt.AlignmentFlag.AlignCenter, sign.symbol)
+
+
+def _apart(place: QPointF, other: QPointF) -> float:
+    return math.hypot(place.x() - other.x(), place.y() - other.y())
 
 
 def sign_icon(sign: Sign) -> QIcon:
@@ -149,10 +155,49 @@ class CompassDial(QWidget):
         QPointF
             The place in pixels.
         """
-        share = 1.0 if mark.distance is None else max(0.15, min(1.0, mark.distance / self.reach))
-        turn, radius = math.radians(mark.bearing), self._radius() * share
-        middle = self._middle()
+        return self._at(mark.bearing, self._share(mark) * self._radius())
+
+    def _at(self, bearing: float, radius: float) -> QPointF:
+        turn, middle = math.radians(bearing), self._middle()
         return QPointF(middle.x() + radius * math.sin(turn), middle.y() - radius * math.cos(turn))
+
+    def _share(self, mark: Mark) -> float:
+        """Return the distance of a mark from the middle, as a share of the radius."""
+        if mark.distance is None:
+            return 1.0
+        share = mark.distance / self.reach
+        if self.reach > FAR_REACH:
+            share = math.log1p(mark.distance / 10.0) / math.log1p(self.reach / 10.0)
+        return max(0.15, min(1.0, share))
+
+    @property
+    def disc(self) -> float:
+        """Radius of the discs in pixels: the more marks, the smaller."""
+        if len(self.marks) <= CROWD:
+            return DISC
+        return max(SMALLEST, DISC * math.sqrt(CROWD / len(self.marks)))
+
+    def places(self) -> list[QPointF]:
+        """Return the places of all marks; in a crowd they move along their bearings.
+
+        Returns
+        -------
+        list of QPointF
+            The place of each mark in pixels.
+        """
+        if len(self.marks) <= CROWD:
+            return [self.place(mark) for mark in self.marks]
+        taken: list[QPointF] = []
+        radius, disc = self._radius(), self.disc
+        for mark in self.marks:
+            wanted = self._share(mark) * radius
+            steps = (0.5 * disc * number for number in range(int(2.0 * radius / disc)))
+            radii = [wanted + side * step for step in steps for side in (-1, 1)]
+            spots = [self._at(mark.bearing, out) for out in radii if 0.15 * radius <= out <= radius]
+            space = [min((_apart(spot, near) for near in taken), default=radius) for spot in spots]
+            free = next((row for row, away in enumerate(space) if away >= 2.0 * disc), None)
+            taken.append(spots[space.index(max(space)) if free is None else free])
+        return taken
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - the names are those of Qt
         """Draw the rings, the axes, and the marks."""
@@ -176,23 +221,20 @@ class CompassDial(QWidget):
             Qt.AlignmentFlag.AlignCenter,
             "N",
         )
-        for mark in self.marks:
-            spot = self.place(mark)
+        places = self.places()
+        for spot in places:
             painter.setPen(QPen(faint, 1))
             painter.drawLine(middle, spot)
-        for mark in self.marks:
+        for mark, spot in zip(self.marks, places):
             sign = self.signs.get(mark.kind)
             if sign is not None:
-                paint_sign(painter, sign, self.place(mark))
+                paint_sign(painter, sign, spot, self.disc)
         painter.end()
 
     def _mark_at(self, spot: QPointF) -> int | None:
         """Return the number of the uppermost mark at a place; None without one."""
-        for number in reversed(range(len(self.marks))):
-            place = self.place(self.marks[number])
-            if math.hypot(place.x() - spot.x(), place.y() - spot.y()) <= DISC + 2:
-                return number
-        return None
+        hit = [_apart(place, spot) <= self.disc + 2 for place in self.places()]
+        return max((number for number, is_hit in enumerate(hit) if is_hit), default=None)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802
         """Emit the clicked mark or bearing."""

@@ -26,6 +26,7 @@ from qgis.PyQt.QtWidgets import (
     QCheckBox,
     QHBoxLayout,
     QLabel,
+    QLineEdit,
     QListView,
     QListWidget,
     QListWidgetItem,
@@ -57,7 +58,7 @@ CELL_COLOUR, LOOKALIKE_COLOUR = QColor("#d55e00"), QColor("#0072b2")
 LOOKALIKES = 20
 LARGEST_SCALE = 2500.0  # denominator
 WIDEST = 110  # pixels, of a column of the table
-CLASS_ROLE = 0x0100  # the first role for data of plugins
+CLASS_ROLE, WORDS_ROLE = 0x0100, 0x0101  # the first roles for data of plugins
 
 
 class SemsigDock(QgsDockWidget):
@@ -101,6 +102,10 @@ class SemsigDock(QgsDockWidget):
         self.dial = CompassDial()
         self.dial.bearing_clicked.connect(self._add_object)
         self.dial.mark_clicked.connect(self._remove_object)
+        self.search = QLineEdit()
+        self.search.setPlaceholderText(tr("Find a class"))
+        self.search.setClearButtonEnabled(True)
+        self.search.textChanged.connect(self._filter_classes)
         self.palette_ = QListWidget()
         self.palette_.setViewMode(QListView.ViewMode.ListMode)
         self.palette_.setFlow(QListView.Flow.LeftToRight)
@@ -132,6 +137,7 @@ class SemsigDock(QgsDockWidget):
         layout.addWidget(self.message)
         layout.addLayout(_row(self.cell_tool, self.view_tool))
         layout.addWidget(self.dial, 2)
+        layout.addWidget(self.search)
         layout.addWidget(self.palette_)
         layout.addLayout(_row(self.north, self.clear, self.find))
         layout.addWidget(self.verdict)
@@ -177,7 +183,7 @@ class SemsigDock(QgsDockWidget):
 
     def _enable(self, *, on: bool) -> None:
         tools = (self.cell_tool, self.view_tool)
-        for widget in (*tools, self.palette_, self.find, self.clear, self.dial):
+        for widget in (*tools, self.search, self.palette_, self.find, self.clear, self.dial):
             widget.setEnabled(on)
 
     def open_database(self) -> None:
@@ -198,26 +204,46 @@ class SemsigDock(QgsDockWidget):
                 name=city["name"], cells=f"{city['cells']:,}"
             )
         )
-        self.dial.reach = city["radius"]
+        self.dial.reach = city["reach"]
+        families, classes = city.get("families", []), city["classes"]
+        # By family, each with an entry for any of its classes; the commonest classes first.
+        kinds = []
+        for family in families or [{"name": ""}]:
+            kinds += [family] if family["name"] else []
+            kinds += [item for item in classes if item.get("family", "") == family["name"]]
+        kinds += [item for item in classes if item not in kinds]
         self.dial.signs = {
             item["name"]: Sign(
                 item["title"],
-                item["symbol"],
+                item.get("symbol", ""),
                 item["colour"],
                 item["ink"],
                 item.get("pictogram", ""),
             )
-            for item in city["classes"]
+            for item in kinds
         }
         self.titles = {sign.symbol: sign.title for sign in self.dial.signs.values()}
         self.palette_.clear()
-        for name, sign in self.dial.signs.items():
+        for item in kinds:
+            sign = self.dial.signs[item["name"]]
             entry = QListWidgetItem(sign_icon(sign), sign.title)
-            entry.setData(CLASS_ROLE, name)
+            entry.setData(CLASS_ROLE, item["name"])
+            entry.setData(WORDS_ROLE, "\n".join([sign.title, *item.get("words", [])]).lower())
             self.palette_.addItem(entry)
         self.palette_.setCurrentRow(0)
         self.clear_view()
         self._enable(on=True)
+
+    def _filter_classes(self, text: str) -> None:
+        """Show the classes with a title or another word that contains a text."""
+        shown = []
+        for row in range(self.palette_.count()):
+            entry = self.palette_.item(row)
+            hidden = text.strip().lower() not in entry.data(WORDS_ROLE)
+            entry.setHidden(hidden)
+            shown += [] if hidden else [row]
+        if shown and self.palette_.currentRow() not in shown:
+            self.palette_.setCurrentRow(shown[0])
 
     # --- Places ------------------------------------------------------------------------------
 
