@@ -95,6 +95,12 @@ def release(tmp_path: Path) -> Path:
     write(folder, "transportation/segment", [way])
     house = feature(1, shapely.box(2.31, 48.85, 2.3101, 48.8501), has_parts=False,
                     is_underground=False)  # fmt: skip
+    shop = {"basic_category": "bakery", "operating_status": "open", "names": {"primary": "Pain"}}
+    closed = {"basic_category": "bank", "operating_status": "permanently_closed"}
+    write(folder, "places/place", [
+        feature(1, places[31], **shop), feature(2, places[32], **closed),
+        feature(3, places[33], basic_category="plumbing_service"),
+    ], basic_category=pa.string(), operating_status=pa.string())  # fmt: skip
     cellar = {**house, "id": "cellar", "is_underground": True}
     write(folder, "buildings/building", [house, cellar], has_parts=pa.bool_(),
           is_underground=pa.bool_())  # fmt: skip
@@ -111,6 +117,7 @@ EXPECTED = {
     "trees": [f"gers-{n}" for n in range(30, 36)],
     "street_lights": ["gers-33"],
     "bus_stops": ["gers-30", "gers-34"],
+    "places": ["gers-1"],
     "buildings": ["gers-1"],
     "streets": ["gers-1"],
 }  # bench 32 is on a level below the ground
@@ -120,7 +127,7 @@ def test_release_is_read_by_type_class_and_level(release: Path) -> None:
     pairs, absent = find_files(SPECS, [release])
     paths = list(dict.fromkeys(path for _, path in pairs))
     assert not absent
-    assert len(paths) == 4
+    assert len(paths) == 5
     layers = read_layers(paths, SPECS)
     assert kept(layers) == kept(read_layers(paths, SPECS, area=AREA)) == EXPECTED
     by_name = {layer.spec.name: layer for layer in layers}
@@ -170,8 +177,8 @@ def test_store_sends_only_the_area_and_only_once(
     layers = read_layers(files, SPECS)
     assert kept(layers) == EXPECTED
     assert layers[-1].table["name"].item() == "Rue"
-    assert steps == [(n, 4) for n in (1, 2, 3, 4)]
-    assert lines == ["s3://maps: release 2026-08-19.0, 4 files"]
+    assert steps == [(n, 5) for n in (1, 2, 3, 4, 5)]
+    assert lines == ["s3://maps: release 2026-08-19.0, 5 files"]
     size = land.stat().st_size
     ranges = [s.headers.get("range", "") for s in server.requests if "type%3Dland" in s.path]
     spans = [text.removeprefix("bytes=").split("-") for text in ranges if text]

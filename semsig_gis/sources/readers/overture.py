@@ -148,7 +148,9 @@ def _slices(
 def _columns(schema: pa.Schema, specs: Iterable[LayerSpec], *, where: str) -> list[str]:
     """Return the columns to read; SourceError if the file is not from Overture Maps."""
     keys = {key for spec in specs for tags in spec.tags for key, _ in tags}
-    if not {"id", GEOMETRY} <= {*schema.names} or keys.isdisjoint(schema.names):
+    # Files of places of older releases lack the key of the layer, yet not these categories.
+    known = {*keys, "categories"}
+    if not {"id", GEOMETRY} <= {*schema.names} or known.isdisjoint(schema.names):
         raise SourceError(
             f"{where} is not a file of Overture Maps, which would have the columns id, geometry "
             f"and class; its columns are {', '.join(schema.names) or 'none at all'}."
