@@ -14,9 +14,11 @@ import pyarrow as pa
 
 from semsig_gis.core import (
     COUNT,
+    HEIGHT,
     MERGED,
     SOURCE,
     SOURCE_ID,
+    TEXTS,
     Displayed,
     InputError,
 )
@@ -91,9 +93,10 @@ def conflate(
     Returns
     -------
     objects : StreetObjects
-        The remaining objects in their order. Each has its source and position, the sum of the
-        ``count`` of the objects merged into it, and their list ``"source:id; source:id"`` in the
-        column ``merged``. The licences of all sources are included.
+        The remaining objects in their order. Each has its source and position, its texts and height
+        (or those of an object merged into it, where it has none), the sum of the ``count`` of the
+        objects merged into it, and their list ``"source:id; source:id"`` in the column ``merged``.
+        The licences of all sources are included.
     report : ConflationReport
         Number of merged objects by class and pair of sources.
 
@@ -203,6 +206,11 @@ def _merged(objects: StreetObjects, keys: _MergeKeys, matches: Sequence[_Match])
         counts[match.first] += counts[match.second]
         entry = f"{source[match.second]}:{source_id[match.second]}"
         entries.setdefault(match.first, []).append(entry)
+    for name in (HEIGHT, *TEXTS):
+        if name in table.column_names:
+            table = table.set_column(
+                table.column_names.index(name), name, _completed(table[name], matches)
+            )
     merged = pa.array(["; ".join(entries.get(row, [])) for row in range(len(table))], pa.string())
     number = table.column_names.index(COUNT)
     table = table.set_column(number, COUNT, pa.array(counts.astype(np.int32)))
@@ -217,6 +225,15 @@ def _merged(objects: StreetObjects, keys: _MergeKeys, matches: Sequence[_Match])
         licenses=objects.licenses,
         notes=objects.notes,
     )
+
+
+def _completed(column: pa.ChunkedArray, matches: Sequence[_Match]) -> pa.Array:
+    """Return a column in which objects without a value have that of an object merged into them."""
+    values = column.to_pylist()
+    for match in matches:
+        if values[match.first] in {"", None} or values[match.first] != values[match.first]:
+            values[match.first] = values[match.second]
+    return pa.array(values, column.type)
 
 
 def _report(

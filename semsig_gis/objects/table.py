@@ -292,17 +292,35 @@ def _has_value(column: pa.ChunkedArray, nothing: object) -> bool:
 
 
 def joined_tables(first: gpd.GeoDataFrame, second: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """Return the rows of two tables of street objects; the groups of the second one are new."""
+    """Return the rows of two tables of street objects.
+
+    Extended things of the second one have new groups, but for those that share an identifier in
+    their source with a thing of the first one, as a river that crosses both areas does.
+    """
     import pandas as pd  # noqa: PLC0415 - 0.4 s
 
     if GROUP in first and GROUP in second:
-        numbers = second[GROUP].to_numpy()
-        shifted = np.where(numbers < 0, numbers, numbers + first[GROUP].max() + 1)
-        second = second.assign(**{GROUP: shifted})
+        second = second.assign(**{GROUP: _joined_groups(first, second)})
     table = pd.concat([first, second], ignore_index=True)
     nothing = {name: value for name, value in OPTIONAL.items() if name in table}
     kinds = {name: COLUMNS[name] for name in nothing if name in NUMBERS}
     return table.fillna(nothing).astype({CLASS_CODE: np.uint8, **kinds})
+
+
+def _joined_groups(first: gpd.GeoDataFrame, second: gpd.GeoDataFrame) -> NDArray[np.int64]:
+    """Return the groups of the second table in the numbers of `joined_tables`."""
+    identifier = [SOURCE, SOURCE_ID]
+    things = [
+        table.loc[(table[GROUP] >= 0) & (table[SOURCE_ID] != ""), [*identifier, GROUP]]
+        for table in (first, second)
+    ]
+    shared = things[1].merge(things[0].drop_duplicates(identifier), on=identifier)
+    shared = shared.drop_duplicates(f"{GROUP}_x").set_index(f"{GROUP}_x")[f"{GROUP}_y"]
+    numbers = second[GROUP].to_numpy(np.int64)
+    renamed: NDArray[np.int64] = np.where(numbers < 0, numbers, numbers + first[GROUP].max() + 1)
+    rows = second[GROUP].isin(shared.index).to_numpy()
+    renamed[rows] = shared.loc[numbers[rows]].to_numpy()
+    return renamed
 
 
 def with_notes(objects: StreetObjects, notes: tuple[str, ...]) -> StreetObjects:

@@ -22,6 +22,7 @@ from semsig_gis.objects import (
     build_objects,
     compare_objects,
     conflate,
+    joined_tables,
     load,
     objects_from_frame,
     open_objects,
@@ -89,7 +90,7 @@ steps = st.tuples(st.integers(-40, 40), st.integers(-40, 40)).filter(any)
 walks = st.lists(steps, min_size=1, max_size=6)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(walks)
 def test_points_of_a_line_are_on_it_and_at_most_five_metres_apart(
     walk: list[tuple[int, int]],
@@ -146,6 +147,34 @@ def test_conflation_leaves_things_whole() -> None:
     second = replace(second, spec=replace(second.spec, name="other"))
     objects, report = conflate(build(first, second), {"river": 5.0})
     assert (report.count, len(objects)) == (0, 14)
+
+
+def test_merged_object_gets_the_texts_that_the_other_one_lacks() -> None:
+    places, classes = [shapely.Point(0, 0), shapely.Point(50, 0)], "bakery"
+    first, second = (raw_layer(places, classes=classes, name=name) for name in ("a", "b"))
+    texts = [["", "Brot"], ["Pain", "Pane"]]
+    first, second = (
+        replace(layer, columns=layer.columns.append_column("name", [column]))
+        for layer, column in zip((first, second), texts, strict=True)
+    )
+    objects, _ = build_objects([first, second], taxonomy=TAXONOMY, crs="EPSG:2154",
+                               apart=["bakery"])  # fmt: skip
+    merged, report = conflate(objects, {"bakery": 5.0})
+    assert report.count == 2
+    assert merged.texts is not None
+    assert merged.texts["name"].to_pylist() == ["Pain", "Brot"]
+
+
+def test_river_of_two_merged_cities_is_one_thing() -> None:
+    line = shapely.LineString([(0, 0), (0, 30)])
+    shifted = shapely.LineString([(0, 2), (0, 40)])
+    first = build(things([line]))
+    second = build(things([shapely.LineString([(90, 0), (90, 30)]), shifted], names=["B", "A"]))
+    table = second.table.assign(source_id=second.table["source_id"].map({"0": "7", "1": "0"}))
+    joined = joined_tables(first.table, table)
+    groups = joined.groupby("source_id")["group"].unique()
+    assert groups["0"].tolist() == [0]
+    assert groups["7"].tolist() == [1]
 
 
 def test_clipped_line_ends_at_the_edge_of_the_area() -> None:
