@@ -284,8 +284,20 @@ class Build:
         return f"with the {' and '.join(defaults)} of {files}{effect} (--no-ground: without them)"
 
     def _summary(self, cells: int, entries: int, mode: str) -> Iterator[str]:
+        from semsig_gis.database import PartitionedDatabase, landmark_costs, open_city
+
         where = {"all": "", "outdoor": " outside buildings", "streets": " along streets"}
+        city = open_city(self.out)
+        dataset = city.dataset
+        reach = dataset.taxonomy.ranges(self.radius).max()
         yield (
             f"{cells:,} cells of {self.step:g} m{where[mode]} see "
-            f"{entries / cells:.1f} street objects on average, up to {self.radius:g} m away."
+            f"{entries / cells:.1f} street objects on average, up to {reach:,g} m away."
         )
+        parts = dataset.parts() if isinstance(dataset, PartitionedDatabase) else [dataset]
+        costs = [
+            f"{title.lower()} {count:,} ({size / 1e6:,.2f} MB)"
+            for title, (count, size) in landmark_costs(parts, city.bytes).items()
+        ]
+        if costs:
+            yield f"Sightings of landmarks, and their part of the file: {', '.join(costs)}."

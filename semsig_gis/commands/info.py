@@ -25,6 +25,7 @@ class ClassProperties(TypedDict):
     symbol: str
     name: str
     title: str
+    family: str
     range_m: float
     number: int
     share: float

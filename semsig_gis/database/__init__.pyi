@@ -60,6 +60,7 @@ from .street_survey import Survey as Survey
 from .street_survey import SurveyRecord as SurveyRecord
 from .street_survey import survey as survey
 from .summary import database_summary as database_summary
+from .summary import landmark_costs as landmark_costs
 from .tiles import TilePlan as TilePlan
 from .tiles import TileSpec as TileSpec
 from .tiles import begin_run as begin_run

@@ -10,7 +10,7 @@ import pandas as pd
 from semsig_gis.core import degree_bounds, plane_distortion
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
@@ -45,8 +45,8 @@ def database_summary(
         (warnings about its data); ``viewpoints``: ``mode``, ``half_width_m`` (of streets,
         else None) and ``area_km2`` (of the chosen area, or None); ``occlusion_m``: the
         tolerance, or None without buildings; ``occurrences``: one dict per class (``code``,
-        ``symbol``, ``name``, ``title``, ``range_m``, ``number``, ``share``, ``objects``: its
-        count or None, ``objects_per_km2``, ``entropy_bits``); ``density_from``:
+        ``symbol``, ``name``, ``title``, ``family``, ``range_m``, ``number``, ``share``,
+        ``objects``: its count or None, ``objects_per_km2``, ``entropy_bits``); ``density_from``:
         ``"objects"`` or ``"occurrences"``; ``cell_bits``; ``groups``: for ``type``,
         ``angle`` and ``both`` the statistics of the group sizes from
         `pandas.Series.describe` (``std`` is that of a sample, None for a single group),
@@ -121,6 +121,27 @@ def database_summary(
     }
 
 
+def landmark_costs(
+    parts: Iterable[SignatureDatabase], file_bytes: int
+) -> dict[str, tuple[int, int]]:
+    """Return the sightings and the bytes of each class of landmarks that is seen, by title.
+
+    `parts` are those of one database, and `file_bytes` is the size of its files, in which every
+    sighting takes about the same room.
+    """
+    counts = np.zeros(256, np.int64)
+    tall: dict[int, str] = {}
+    for part in parts:
+        counts += part.occurrences
+        tall |= {item.code: item.title for item in part.taxonomy.classes if item.tall}
+    each = file_bytes / max(int(counts.sum()), 1)
+    return {
+        title: (int(counts[code]), round(each * int(counts[code])))
+        for code, title in sorted(tall.items())
+        if counts[code]
+    }
+
+
 def _class_facts(
     database: SignatureDatabase,
     item: ObjectClass,
@@ -144,6 +165,7 @@ def _class_facts(
         "symbol": item.symbol,
         "name": item.name,
         "title": item.title,
+        "family": item.family,
         "range_m": range_m,
         "number": number,
         "share": number / total,

@@ -542,13 +542,13 @@ def _ids_between(
     boxes: list[NDArray[np.float64]],
 ) -> NDArray[np.int64]:
     """Return the ids of the cells in range of a landmark that are in only one of two boxes."""
-    found = []
+    parts_of_boxes = []
     for objects in parts:
         tall = np.isin(objects.codes, database.taxonomy.tall_codes)
         ids = _ids_in_range(database, objects.xy[tall], objects.codes[tall])
         inside = [in_box(database.grid.viewpoints(*split_ids(ids)), box) for box in boxes]
-        found.append(ids[inside[0] != inside[1]])
-    return np.union1d(*found)
+        parts_of_boxes.append(ids[inside[0] != inside[1]])
+    return np.union1d(*parts_of_boxes)
 
 
 def _hiding(database: SignatureDatabase, store: ObjectStore) -> gpd.GeoDataFrame | None:

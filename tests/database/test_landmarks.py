@@ -64,7 +64,7 @@ houses = st.lists(
 
 def town(*rows: Thing, layer: str = "world") -> StreetObjects:
     """Return objects, with groups and heights if there are any."""
-    named = [
+    points = [
         (CORNER[0] + x, CORNER[1] + y, code, layer, str(number))
         for number, (x, y, code, _, _) in enumerate(rows)
     ]
@@ -76,7 +76,7 @@ def town(*rows: Thing, layer: str = "world") -> StreetObjects:
     if not np.isnan(heights).all():
         columns[HEIGHT] = heights
     licenses = (Licence("World (CC0)", (layer,)),)
-    return objects_of(*named, licenses=licenses, taxonomy=TAXONOMY, **columns)
+    return objects_of(*points, licenses=licenses, taxonomy=TAXONOMY, **columns)
 
 
 def buildings(rows: list[tuple[float, float, float]]) -> gpd.GeoDataFrame | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import Table, percent
+from semsig_gis.core import Table, family_named, percent
 from semsig_gis.database import database_summary
 from semsig_gis.evaluation import published as paris
 from semsig_gis.output.tables.tables import distortion_rows, note_tables
@@ -39,7 +39,9 @@ def database_tables(
     text = first if symbols else database.taxonomy.words(database.taxonomy.encode(first))
     more = f"… ({len(types)} objects)" if len(types) > MOST_TYPES else ""
     facts["largest_type_group"]["types"] = text + more
-    tables = (_occurrence_table, _property_table, _group_table, _class_table)
+    tables = [_occurrence_table, _property_table, _group_table, _class_table]
+    if len({item["family"] for item in facts["occurrences"] if item["number"]}) > 1:
+        tables.append(_family_table)
     return (*(table(facts) for table in tables), *note_tables(facts["notes"]))
 
 
@@ -48,9 +50,10 @@ def database_sentences(facts: Mapping[str, Any], *, symbols: bool = False) -> li
 
     With `symbols`, a class has its letter as well.
     """
+    ranges = (item["range_m"] for item in facts["occurrences"] if item["number"])
     size = (
         f"{facts['signatures']:,} cells of {facts['step_m']:g} m see {facts['mean_length']:.1f} "
-        f"street objects on average, up to {facts['radius_m']:g} m away; "
+        f"street objects on average, up to {max(ranges):,g} m away; "
         f"{percent(facts['groups']['type']['unique'], 0)} of them see classes in an order that no "
         "other cell sees."
     )
@@ -67,6 +70,28 @@ def companion_table(title: str, companions: Iterable[Companion]) -> Table:
     """Return a table of the files that belong to a database."""
     rows = ((file.path.name, file.what, f"{file.bytes / 1e6:,.1f}") for file in companions)
     return Table(title, ("File", "What", "MB"), tuple(rows))
+
+
+def _family_table(facts: Mapping[str, Any]) -> Table:
+    items_of: dict[str, list[Mapping[str, Any]]] = {}
+    for item in facts["occurrences"]:
+        if item["number"] or item["objects"]:
+            items_of.setdefault(item["family"], []).append(item)
+    order = sorted(items_of, key=lambda family: -sum(item["number"] for item in items_of[family]))
+    rows = [items_of[family] for family in order]
+    counted = facts["density_from"] == "objects"
+    objects = {"Objects": [f"{sum(item['objects'] for item in row):,}" for row in rows]}
+    return Table.of_columns(
+        "Families of classes",
+        {
+            "Family": [family_named(family).title for family in order],
+            "Classes": [str(len(row)) for row in rows],
+            **(objects if counted else {}),
+            "Occurrences": [f"{sum(item['number'] for item in row):,}" for row in rows],
+            "Share": [percent(sum(item["share"] for item in row), 1) for row in rows],
+        },
+        "Points of a line or an outline count as objects, the nearest one as an occurrence.",
+    )
 
 
 def _occurrence_table(facts: Mapping[str, Any]) -> Table:
