@@ -117,7 +117,7 @@ def is_hidden(
     return False
 
 
-@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(things, min_size=1, max_size=6), houses)
 def test_landmarks_are_seen_over_lower_roofs_in_the_box_of_the_city(
     rows: list[Thing], roofs: list[tuple[float, float, float]]
@@ -178,7 +178,7 @@ def assert_equal(first: SignatureDatabase, second: SignatureDatabase) -> None:
     assert widths[0].tolist() == widths[1].tolist()
 
 
-@settings(max_examples=3, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=2, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(things, min_size=2, max_size=9), st.integers(1, 8), houses)
 def test_tiles_updates_and_merges_equal_a_build(
     rows: list[Thing], cut: int, roofs: list[tuple[float, float, float]]
