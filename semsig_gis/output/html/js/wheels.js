@@ -132,6 +132,14 @@ semsig.wheel = (
     taken.push(at(angle, radius));
     return radius;
   };
+  // Landmarks in one direction stand behind each other; only one of them has its distance.
+  const farRadius = (angle) => {
+    let radius = 54 + size;
+    while (apart(at(angle, radius)) < size && radius < 54 + 4 * size) radius += size / 2;
+    taken.push(at(angle, radius));
+    return radius;
+  };
+  const labels = [];
   const arcs = semsig.svg(drawing, "g", {});
   // Without distances, signs that would overlap move from the rim nearer to the middle.
   const circles = [];
@@ -145,7 +153,7 @@ semsig.wheel = (
     })) * radius;
     const metres = look.metres?.[index] ?? null;
     const scaled = metres === null ? 0 : semsig.share(metres, look.reach) * reach;
-    const free = isFar(index) ? {radius: 54 + size, angles: []}
+    const free = isFar(index) ? {radius: farRadius(angle), angles: []}
       : metres !== null
         ? {radius: crowded ? freeRadius(angle, scaled) : scaled, angles: []}
         : look.metres ? circles[0]
@@ -173,9 +181,12 @@ semsig.wheel = (
     }
     if (isFar(index)) {
       const [textX, textY] = at(angle, free.radius + size + 6);
-      const x = textX + 6 * Math.sin(angle);
-      semsig.svg(object, "text", {x, y: textY + 2, "font-size": 6, class: "scale"},
-        semsig.lengthText(metres));
+      const [x, y] = [textX + 6 * Math.sin(angle), textY + 2];
+      if (labels.every(([u, v]) => Math.abs(u - x) > 18 || Math.abs(v - y) > 7)) {
+        labels.push([x, y]);
+        semsig.svg(object, "text", {x, y, "font-size": 6, class: "scale"},
+          semsig.lengthText(metres));
+      }
     }
     // Smaller outside the sectors, so that they hide less.
     const own = look.metres && verdict === "outside" ? 0.65 * size : size;
