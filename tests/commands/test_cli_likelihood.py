@@ -52,6 +52,33 @@ def options(view: dict[str, Any]) -> tuple[str, ...]:
     return ("--types", view["types"], "--bearings", ",".join(map(str, view["bearings"])))
 
 
+def test_what_was_read_is_compared_with_the_map(tmp_path: Path, run: Run) -> None:
+    names = [f"Kiosk {chr(97 + row % 26) * 3}{chr(97 + row // 26) * 3}" for row in range(300)]
+    table = STORE.objects.table
+    table = table.assign(name=names[: len(table)])
+    store = ObjectStore.of(dataclasses.replace(STORE.objects, table=table))
+    save_with_store(CITY, store, tmp_path / "city.parquet")
+    lines: list[dict[str, Any]] = [
+        {"see": "tree 'kiosk cccaaa' at 40, bench at 90, sign 'Nowhere'"},
+        {"detections": [{"class": "tree", "bearing": 40, "text": "Kiosk cccaaa"}]},
+        {"types": "?", "bearings": [40], "texts": ["Kiosk cccaab"], "signs": ["Kiosk ddd"]},
+    ]
+    (tmp_path / "views.jsonl").write_text("\n".join(map(json.dumps, lines)))
+    city, views = str(tmp_path / "city.parquet"), str(tmp_path / "views.jsonl")
+    code, out, _ = run("localize", city, "--queries", views, "--json")
+    answers = list(map(json.loads, out.splitlines()))
+    assert code == 0
+    fits = [[(text["fit"], text["names"]) for text in answer["texts"]] for answer in answers]
+    exact = "exact", ["Kiosk cccaaa"]
+    assert fits[0] == [exact, ("none", [])]
+    assert fits[1] == [exact]
+    assert [fit for fit, _ in fits[2]] == ["letters off", "part"]
+    assert any("'Nowhere'" in note for note in answers[0]["notes"])
+    code, out, _ = run("localize", city, lines[0]["see"], "--explain")
+    assert "'kiosk cccaaa' is Kiosk cccaaa." in out
+    assert "that reads 'kiosk cccaaa'" in out
+
+
 def test_a_view_from_any_of_several_cities(city: Path, tmp_path: Path, run: Run) -> None:
     other = random_town(5, count=150).database
     other_zone = dataclasses.replace(other, crs=CRS("EPSG:32631"), licenses=("Other (CC0)",))

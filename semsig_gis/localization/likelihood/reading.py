@@ -4,8 +4,8 @@ A text s that was read on an object fits the texts of the map at a level: exactl
 few letters off. If the detection is an object of class c with texts that fit at level l, the text
 is ``SHARES[l] / b`` times as likely as anywhere, where b is the share of the texts of class c that
 fit at this level; if they do not fit, it is ``MISREAD`` times as likely, divided by their share.
-Objects without a text, and false objects, are as likely as anywhere. So the mean over the objects
-of a class is about 1, and a common text says little.
+The factor of an object that fits is 1 or more, and of others 1 or less. Objects without a text,
+and false objects, are as likely as anywhere. So a common text says little.
 
 Objects that fit are parts of their class for the one question: they get free class codes in a copy
 of the database and of the street objects (`DividedTaxonomy`), and the scores of a detection are
@@ -65,9 +65,9 @@ if TYPE_CHECKING:
 else:
     shapely = lazy_loader.load("shapely")
 
-SHARES = {LETTERS_OFF: 0.1, PART: 0.2, EXACT: 0.55}
+SHARES = {LETTERS_OFF: 0.1, PART: 0.2, EXACT: 0.5}
 """Chance that what is read on an object fits its text on the map at each level."""
-MISREAD = 0.15
+MISREAD = 0.2
 """Chance that it does not fit: it was read wrongly, or the map is wrong."""
 USUAL_TEXTS = 20.0
 """Texts of any class by which the share in the texts of one class is smoothed."""
@@ -313,7 +313,7 @@ def _factors(
             counts = np.bincount(codes[own == level], minlength=256)
             usual = (counts.sum() + 0.5) / (has_text.sum() + 1.0)
             often = (counts + USUAL_TEXTS * usual) / (sizes + USUAL_TEXTS)
-            factors[text, :, level] = share / often
+            factors[text, :, level] = np.maximum(share / often, 1.0)
             rest -= often
         factors[text, :, NONE] = np.minimum(MISREAD / np.maximum(rest, MISREAD), 1.0)
     return factors

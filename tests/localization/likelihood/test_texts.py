@@ -193,7 +193,7 @@ def test_text_that_all_objects_have_says_little() -> None:
     view = View(np.array([LAMP, TREE]), np.array([10.0, 80.0]))
     without = locate(index, view, store=store)
     same = locate(index, replace(view, texts=("Town lights",) * 2), store=store)
-    assert np.abs(same.chances - without.chances).max() < 0.12
+    assert np.abs(same.chances - without.chances).max() < 1e-6
 
 
 @given(st.permutations(range(3)))
@@ -280,8 +280,8 @@ def _slow_factor(text: str, row: int) -> float:
         for fit in (NEARLY, PART, EXACT)
     }
     if not fits[row]:
-        return min(0.15 / max(1.0 - sum(often.values()), 0.15), 1.0)
-    return {NEARLY: 0.1, PART: 0.2, EXACT: 0.55}[fits[row]] / often[fits[row]]
+        return min(0.2 / max(1.0 - sum(often.values()), 0.2), 1.0)
+    return max({NEARLY: 0.1, PART: 0.2, EXACT: 0.5}[fits[row]] / often[fits[row]], 1.0)
 
 
 def _near_street(level: float) -> NDArray[np.bool_]:
@@ -296,7 +296,7 @@ def test_name_of_a_street_is_evidence_along_the_street() -> None:
     assert answer.to_dict()["texts"][0]["kind"] == "street"
     assert not answer.notes
     chances = answer.chances[_near_street(20.0)].sum()
-    assert chances > 0.8
+    assert chances > 0.7
     assert (
         np.ptp(np.log(answer.chances / locate(index, nothing).chances)[_near_street(20.0)]) < 1e-6
     )
@@ -329,5 +329,5 @@ def test_texts_of_a_route_are_those_of_their_views() -> None:
     nothing = View(np.empty(0, np.uint8), np.empty(0))
     views = [nothing, replace(nothing, signs=("Calle Mayor",))]
     first, last = locate_route(index, views, [Leg(dx=0.0, dy=100.0, sigma=5.0)], store=store)
-    assert last.chances[_near_street(180.0)].sum() > 0.8
-    assert first.chances[_near_street(80.0)].sum() > 0.7
+    assert last.chances[_near_street(180.0)].sum() > 0.7
+    assert first.chances[_near_street(80.0)].sum() > 0.6
