@@ -18,13 +18,13 @@ from semsig_gis.core import (
     InputError,
     Signature,
     SignatureSpec,
-    UnknownNameError,
     nearest_name,
     wrap_degrees,
     wrapped_bearings,
 )
 from semsig_gis.observation.spoken import read_sentence
 from semsig_gis.observation.view import CLASSES, ROUNDING, Photo, View
+from semsig_gis.observation.vocabulary import Vocabulary
 from semsig_gis.sources import class_codes
 from semsig_gis.storage import row_value
 
@@ -47,6 +47,8 @@ LOOK = ("heading", "fov", "sectors", "heading_error")
 """Keys of a row that describe the direction of a photo."""
 
 RADIUS_M: float = SignatureSpec().radius
+LEAST_LETTERS = 4
+"""Length of the shortest text that is a word if it is written like one."""
 GUESS_ERROR = 0.25
 """Relative error of distances that a person estimates."""
 THIRDS = {"near": (0, 1), "middle": (1, 2), "far": (2, 3)}
@@ -193,16 +195,17 @@ def parse_seen(row: Row, *, taxonomy: Taxonomy, radius: float) -> tuple[View, Co
 def text_row(text: str, taxonomy: Taxonomy) -> Row:
     """Return a person's text as a row: ``types`` if it consists of symbols, otherwise ``see``.
 
-    One word consists of symbols if all its letters are symbols and it is not a word for a class, or
-    if it has only capitals: then ``DDBQ`` is an error because of its ``Q``.
+    One word consists of symbols if it has only capitals, or if all its letters are symbols, it is
+    no word for a thing in any language, and not written like a word: four or more lower-case
+    letters, the first perhaps a capital. Then ``DDBQ`` is an error because of its ``Q``.
     """
     word = text.strip()
     symbols = {"?", *(item.symbol for item in taxonomy.classes)}
-    if word and (symbols.issuperset(word) or (word.isalpha() and word.isupper())):
-        try:
-            class_codes(word, taxonomy)
-        except UnknownNameError:
-            return {"types": word}
+    is_like_word = len(word) >= LEAST_LETTERS and word.isalpha() and word[1:].islower()
+    is_symbols = symbols.issuperset(word) and not is_like_word
+    if word and (is_symbols or (word.isalpha() and word.isupper())):
+        known = len(word) > 1 and Vocabulary.of([word], taxonomy).codes_of([word])
+        return {"see": text} if known else {"types": word}
     return {"see": text}
 
 

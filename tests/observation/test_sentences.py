@@ -22,6 +22,7 @@ from semsig_gis.observation import (
     parse_seen,
     parse_view,
     read_description,
+    text_row,
 )
 from semsig_gis.sources import built_in_taxonomy, data_folder, paper_taxonomy
 
@@ -579,3 +580,24 @@ def test_phrases_are_written_as_they_are_compared() -> None:
                 assert phrase.isascii() or phrase == "°"
                 assert 1 <= len(phrase.split()) <= 6, phrase
         assert all(letters.isupper() and len(letters) <= 3 for letters in table["letters"])
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("DDBL", "types"),
+        ("DcBs", "types"),
+        ("cc", "types"),
+        ("?", "types"),
+        ("DDBQ", "types"),
+        ("shop", "see"),
+        ("maison", "see"),
+        ("Turm", "see"),
+        ("blorb", "see"),
+        ("río", "see"),
+        ("BENCH", "see"),
+        ("bench at 40", "see"),
+    ],
+)
+def test_one_word_is_of_symbols_unless_it_is_written_like_a_word(text: str, key: str) -> None:
+    assert text_row(text, TAXONOMY) == {key: text}
