@@ -423,7 +423,7 @@ def test_server_and_file_give_the_same_city(geodata: Path, tmp_path: Path) -> No
     file = geodata / "osm" / "neukolln_2024.osm"
     answer = tmp_path / "neukolln.json"
     answer.write_bytes(as_overpass(file))
-    specs = load_catalog("openstreetmap").layers
+    specs = [spec for spec in load_catalog("openstreetmap").layers if spec.derive is None]
     pairs = zip(read_layers(answer, specs), osm_file.read_layers(file, specs), strict=True)
     rows = 0
     for ours, theirs in pairs:

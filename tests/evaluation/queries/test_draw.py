@@ -160,7 +160,11 @@ def test_classes_are_matched_by_name_and_unknown_ones_are_dropped() -> None:
 def monaco(geodata: Path, year: int) -> tuple[SignatureDatabase, ObjectStore]:
     catalog = load_catalog("openstreetmap")
     file = geodata / "osm" / f"monaco_{year}.osm.pbf"
-    layers, _ = read_files(choose_layers(catalog, surroundings=True), [file])
+    # Of street furniture only, so that there are places from which no object is visible.
+    furniture = {item.name for item in catalog.taxonomy.classes if item.family == "furniture"}
+    specs = [spec for spec in catalog.layers if not spec.optional and spec.classes]
+    names = [spec.name for spec in specs if furniture.issuperset(spec.classes)]
+    layers, _ = read_files(choose_layers(catalog, names, surroundings=True), [file])
     loaded = assemble(layers, catalog)
     database = build_database(
         loaded.objects, viewpoints=ViewpointSpec(mode="outdoor"), footprints=loaded.buildings
