@@ -213,7 +213,9 @@ LINE = 0.19
 TITLE_LETTERS = 46
 TYPE_LETTERS, TYPE_LINES = 42, 3
 CLASS_LETTERS = 21
-MANY_OBJECTS = 40
+MANY_OBJECTS, MANY_KEYS = 40, 24
+EDGE = 0.93  # farthest place of a landmark, in halves of the width of a map
+LABEL_TURN = 0.2  # radians, in which only one landmark has its distance
 RIM = 1.13  # radius of the letters of a query, in visibility ranges
 HALO = {"facecolor": GROUND, "alpha": 0.85, "edgecolor": "none", "pad": 1}  # behind letters
 _IN_FRONT: dict[str, Any] = {"ha": "center", "bbox": HALO}
@@ -323,19 +325,38 @@ def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
     # The map reaches as far as the range, the objects and an answer that is near.
     away = math.hypot(*scene.answer) if scene.answer else 0.0
     near = away if away < FARTHEST * scene.radius else 0.0
-    farthest = max((math.hypot(item.east, item.north) for item in scene.objects), default=0.0)
+    # Landmarks far away stand at the edge, with their distance.
+    tall = {item.code for item in scene.taxonomy.classes if item.tall}
+    things = (item for item in scene.objects if item.code not in tall)
+    farthest = max((math.hypot(item.east, item.north) for item in things), default=0.0)
     reach = max(AROUND * scene.radius, 1.08 * farthest, 1.12 * near)
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xticks=[], yticks=[], aspect="equal")
     axes.add_patch(Circle((0, 0), scene.radius, facecolor=GROUND, edgecolor=SOFT, linestyle="--"))
     # Lines of sight, the other objects, then the visible objects from the farthest to the nearest.
-    lines = [[(0.0, 0.0), (item.east, item.north)] for item in scene.objects]
+    objects = [_at_edge(item, EDGE * reach) for item in scene.objects]
+    lines = [[(0.0, 0.0), (item.east, item.north)] for item in objects]
     axes.add_collection(LineCollection(lines, colors=SOFT, linewidths=0.5, zorder=2))
     for item in scene.others:
         marker = _class_marker(signs.get(item.code, UNKNOWN), 5)
         axes.plot(item.east, item.north, **marker, alpha=0.25, markeredgewidth=0, zorder=1.5)
     size = 8 if len(scene.objects) > MANY_OBJECTS else 10
-    for item in sorted(scene.objects, key=lambda item: -math.hypot(item.east, item.north)):
+    for item in sorted(objects, key=lambda item: -math.hypot(item.east, item.north)):
         _draw_object(axes, item, signs.get(item.code, UNKNOWN), size)
+    far = {
+        round(math.atan2(shown.north, shown.east) / LABEL_TURN): (shown, item)
+        for item, shown in zip(scene.objects, objects, strict=True)
+        if shown is not item
+    }
+    for shown, item in far.values():
+        font: dict[str, Any] = {"size": 6.5, "color": INK, "ha": "center", "va": "center"}
+        axes.annotate(
+            length(math.hypot(item.east, item.north)),
+            (shown.east, shown.north),
+            xytext=(0, -size),
+            textcoords="offset points",
+            zorder=5,
+            **font,
+        )
     edge: dict[str, Any] = {"markeredgecolor": GROUND, "markeredgewidth": 1.5}
     axes.plot(0, 0, color=INK, marker="o", markersize=7, **edge, zorder=6)
     for code, bearing in scene.asked:
@@ -344,6 +365,13 @@ def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
         _draw_answer(axes, scene.answer, away, reach)
     draw_north(axes)
     draw_scale(axes, reach)
+
+
+def _at_edge(item: SceneObject, edge: float) -> SceneObject:
+    """Return an object at most `edge` metres away, in its direction."""
+    away = math.hypot(item.east, item.north)
+    share = edge / away if away > edge else 1.0
+    return item if share == 1.0 else replace(item, east=share * item.east, north=share * item.north)
 
 
 def _class_marker(sign: ClassSign, size: float) -> dict[str, Any]:
@@ -441,7 +469,10 @@ def _legend_keys(scene: Scene, signs: dict[int, ClassSign]) -> list[tuple[Line2D
     """Return a key for each class, with its count, or pale if no object of it is visible."""
     counts = Counter(item.code for item in scene.objects)
     keys = []
-    for code in sorted({*counts, *(item.code for item in scene.others)}):
+    codes = {*counts, *(item.code for item in scene.others)}
+    if len(codes) > MANY_KEYS:  # only those that are seen
+        codes = {*counts}
+    for code in sorted(codes):
         sign = signs.get(code, UNKNOWN)
         count = f" ({counts[code]})" if counts[code] else ""
         key = Line2D([], [], linestyle="", markeredgewidth=0, **_class_marker(sign, 8))
