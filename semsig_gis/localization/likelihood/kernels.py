@@ -452,18 +452,24 @@ def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
         factorials[value] = factorials[value - 1] + math.log(value)
     share = (size - query[kinds]) / size  # of detections of known class
     counts = np.empty(kinds, np.int64)
+    seen = np.empty(kinds, np.int64)  # classes of a sequence, ascending
     for row in range(len(scores)):
         length = min(offsets[row + 1] - offsets[row], len(detected) - 1)
         counts[:] = 0
         for entry in range(offsets[row], offsets[row + 1]):
             counts[row_of[codes[entry]]] += 1
+        different = 0
+        for kind in range(kinds):
+            if counts[kind] > 0:
+                seen[different] = kind
+                different += 1
         total = 0.0
         unnamed = 0.0  # expected detections of any name
         # Each name: the number that the query has, over all splits into right and wrong names.
         for name in range(kinds):
             stray = clutter[name]  # expected detections of other things under this name
-            for kind in range(kinds):
-                if counts[kind] > 0 and kind != name:
+            for kind in seen[:different]:
+                if kind != name:
                     named = misnamed[length, kind] * others[kind, name]
                     stray += counts[kind] * detected[length, kind] * named
             unnamed += clutter[name] + counts[name] * detected[length, name]
@@ -472,6 +478,9 @@ def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
             own, number = counts[name], query[name]
             if stray == 0.0:
                 continue  # no class of the query is known
+            if own == 0 and number == 0:
+                total -= stray
+                continue
             # Binomial hits and Poisson strays that add up to the number of the query, as
             # logarithms: `mass` is relative to the largest term, `peak`.
             peak = -np.inf
