@@ -422,7 +422,7 @@ def promising_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.int64
 
 
 @compiled
-def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
+def count_types(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
     offsets: NDArray[np.int64],
     codes: NDArray[np.uint8],
     row_of: NDArray[np.int64],
