@@ -187,17 +187,17 @@ class CompassDial(QWidget):
         """
         if len(self.marks) <= CROWD:
             return [self.place(mark) for mark in self.marks]
-        taken: list[QPointF] = []
+        others: list[QPointF] = []
         radius, disc = self._radius(), self.disc
         for mark in self.marks:
-            wanted = self._share(mark) * radius
+            ideal = self._share(mark) * radius
             steps = (0.5 * disc * number for number in range(int(2.0 * radius / disc)))
-            radii = [wanted + side * step for step in steps for side in (-1, 1)]
+            radii = [ideal + side * step for step in steps for side in (-1, 1)]
             spots = [self._at(mark.bearing, out) for out in radii if 0.15 * radius <= out <= radius]
-            space = [min((_apart(spot, near) for near in taken), default=radius) for spot in spots]
+            space = [min((_apart(spot, near) for near in others), default=radius) for spot in spots]
             free = next((row for row, away in enumerate(space) if away >= 2.0 * disc), None)
-            taken.append(spots[space.index(max(space)) if free is None else free])
-        return taken
+            others.append(spots[space.index(max(space)) if free is None else free])
+        return others
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - the names are those of Qt
         """Draw the rings, the axes, and the marks."""

@@ -180,8 +180,8 @@ class Workbench:
             (item for item in self.taxonomy.classes if item.code in present),
             key=lambda item: -int(occurrences[item.code]),
         )
-        seen = [item.code for item in kinds if shares[item.code] > 0]
-        groups = codes_by_family(self.taxonomy, seen)
+        codes = [item.code for item in kinds if shares[item.code] > 0]
+        groups = codes_by_family(self.taxonomy, codes)
         families = [
             {
                 "name": name,
