@@ -149,8 +149,8 @@ def _columns(schema: pa.Schema, specs: Iterable[LayerSpec], *, where: str) -> li
     """Return the columns to read; SourceError if the file is not from Overture Maps."""
     keys = {key for spec in specs for tags in spec.tags for key, _ in tags}
     # Files of places of older releases lack the key of the layer, yet not these categories.
-    known = {*keys, "categories"}
-    if not {"id", GEOMETRY} <= {*schema.names} or known.isdisjoint(schema.names):
+    columns = {*keys, "categories"}
+    if not {"id", GEOMETRY} <= {*schema.names} or columns.isdisjoint(schema.names):
         raise SourceError(
             f"{where} is not a file of Overture Maps, which would have the columns id, geometry "
             f"and class; its columns are {', '.join(schema.names) or 'none at all'}."
