@@ -52,7 +52,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
 
 def ours(path: Path) -> None:
     """Read the file with the package."""
-    read_layers(path, load_catalog("openstreetmap").layers)
+    read_layers(path, [spec for spec in load_catalog("openstreetmap").layers if spec.tags])
 
 
 def bare(path: Path) -> None:
