@@ -204,8 +204,8 @@ def text_row(text: str, taxonomy: Taxonomy) -> Row:
     is_like_word = len(word) >= LEAST_LETTERS and word.isalpha() and word[1:].islower()
     is_symbols = symbols.issuperset(word) and not is_like_word
     if word and (is_symbols or (word.isalpha() and word.isupper())):
-        known = len(word) > 1 and Vocabulary.of([word], taxonomy).codes_of([word])
-        return {"see": text} if known else {"types": word}
+        codes = len(word) > 1 and Vocabulary.of([word], taxonomy).codes_of([word])
+        return {"see": text} if codes else {"types": word}
     return {"see": text}
 
 
