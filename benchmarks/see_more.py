@@ -152,7 +152,9 @@ def main() -> None:
         file = Path(options.geodata) / "osm" / CITIES[name]
         for row in _rows(name, file, missing, count, options.processes) if missing else ():
             print(_text(row), flush=True)
-            rows = sorted([*rows, row], key=_order)
+            # A row of another number of views is replaced.
+            others = [item for item in rows if _order(item) != _order(row)]
+            rows = sorted([*others, row], key=_order)
             write_rows(options.out, rows)
     for name, bar in bars(rows):
         print(f"{name}: {bar}")
