@@ -77,6 +77,9 @@ if TYPE_CHECKING:
     from semsig_gis.objects import ClassChange, StreetObjects
 
 
+MOST_PAIRS = 1 << 24  # of cells and changed objects at a time
+
+
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
 class UpdateReport(Displayed):
     """Counts of the changes by an update.
@@ -530,10 +533,16 @@ def _ids_in_range(
     ranges = database.taxonomy.ranges(database.spec.radius)[codes]
     reach = float(ranges.max())
     columns, rows = cells_near(places, grid=database.grid, radius=reach)
-    viewpoints = database.grid.viewpoints(columns, rows)
-    pairs = PackedIndex(places).pairs_within(viewpoints, radius=reach)
-    near = np.unique(measure_sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
-    return cell_ids(columns[near], rows[near])
+    index, near = PackedIndex(places), []
+    size = max(MOST_PAIRS // len(places), 1)
+    for start in range(0, len(columns), size):  # to bound the memory
+        block = slice(start, start + size)
+        viewpoints = database.grid.viewpoints(columns[block], rows[block])
+        pairs = index.pairs_within(viewpoints, radius=reach)
+        sightings = measure_sightings(*pairs, viewpoints, places, ranges=ranges)
+        near.append(start + np.unique(sightings.viewpoint))
+    cells = np.concatenate(near)
+    return cell_ids(columns[cells], rows[cells])
 
 
 def _ids_between(
