@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Literal
 
 import geopandas as gpd
@@ -12,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from raw_layers import raw_layer
 
-from semsig_gis.objects import assemble
+from semsig_gis.objects import assemble, load
 from semsig_gis.sources import (
     Catalog,
     LayerSpec,
@@ -24,6 +25,9 @@ from semsig_gis.sources import (
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from semsig_gis.objects import Loaded
     from semsig_gis.sources import Derivation
@@ -224,3 +228,25 @@ def test_building_of_a_shop_has_it_at_its_front() -> None:
     places = town(streets=[street], houses=[house], objects=[area, church]).objects.xy - ORIGIN
     assert places == pytest.approx(np.array([(9.0, -0.5), (10.0, 15.0)]), abs=2.1)
     assert places[1] == pytest.approx((10, 15))
+
+
+def test_fronts_of_a_real_town_are_outside_of_all_buildings(geodata: Path) -> None:
+    loaded = load(geodata / "osm" / "neukolln_2024.osm", layers=["shops", "food"])
+    footprints = loaded.buildings
+    assert footprints is not None
+    points: NDArray[np.object_] = np.asarray(shapely.points(loaded.objects.xy), object)
+    tree = shapely.STRtree(footprints.geometry.to_numpy())
+    inside, building = tree.query(points, predicate="within")
+    depth = shapely.distance(
+        points[inside], shapely.boundary(footprints.geometry.to_numpy()[building])
+    )
+    assert loaded.report.fronts > 20
+    assert depth.max(initial=0) <= 0.5
+
+
+def test_roundabouts_of_a_real_town_are_those_of_its_tags(geodata: Path) -> None:
+    """Counted by pyosmium with the tag junction=roundabout, joined to rings: 22 of 26 and 24."""
+    loaded = load(geodata / "osm" / "monaco_2022.osm.pbf", layers=["junctions"])
+    counts = Counter(loaded.objects.taxonomy.by_code(code).name for code in loaded.objects.codes)
+    assert 20 <= counts["roundabout"] <= 28
+    assert counts["t_junction"] > counts["crossroads"] > counts["large_junction"] > 0
