@@ -168,7 +168,9 @@ def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
     layer = _cut(layer, area) if layer.spec.extended else layer
     outside, _ = _outside(layer, area)
     counts = dataclasses.replace(layer.counts, outside=layer.counts.outside + int(outside.sum()))
-    return layer.select(~outside, counts=counts, extent=area)
+    # Rows beyond the box of the file are still noted; surroundings end where the area does.
+    extent = layer.extent if layer.spec.role == "objects" else area
+    return layer.select(~outside, counts=counts, extent=extent)
 
 
 def _cut(layer: RawLayer, area: Area) -> RawLayer:
