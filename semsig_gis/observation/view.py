@@ -409,15 +409,15 @@ class View(Signature):
         families: dict[frozenset[int], str] = {}
         for family in {item.family for item in taxonomy.classes} - {""}:
             families[frozenset(taxonomy.family_codes(family).tolist())] = family
-        found = []
+        words = []
         for row in self.class_scores():
             best = np.flatnonzero(row == row.max()).tolist()
             if len(best) > 1 and WILDCARD in best:
                 best.remove(WILDCARD)
             family = families.get(frozenset(best), "") if len(best) > 1 else ""
             names = (taxonomy.by_code(code).name if code else UNKNOWN_NAME for code in best)
-            found.append(family or " or ".join(names))
-        return found
+            words.append(family or " or ".join(names))
+        return words
 
     def among(self, codes: ArrayLike) -> NDArray[np.bool_]:
         """Return a mask of objects that may be of these classes, or any class, shape (n,)."""

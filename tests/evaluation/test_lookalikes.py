@@ -331,8 +331,8 @@ def test_columns_agree_with_the_noise_table(noise: NoiseSpec, seed: int, cells: 
     detected, far = table.detected[length, kinds], database.distance_units
     chance = detected * table.remaining[kinds, far]
     density = chance / (1.0 - chance) * inside + detected * table.leaving[kinds, far] / 360.0
-    named = np.stack([table.named(row) for row in range(len(table.missed))])
-    density *= named[length, kinds, name]
+    chances = np.stack([table.named(row) for row in range(len(table.missed))])
+    density *= chances[length, kinds, name]
     expected = np.log1p(np.bincount(owner, density, cells) / table.density[name])
     # A byte holds at most 255 steps; standard deviations are rounded to levels if they differ.
     expected = np.minimum(expected, 255 * columns.step)

@@ -272,7 +272,7 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
     hits, trials = of_objects[:, None] * _detected_objects(evidence, association, model)
     turns = of_pairs * _bearing_errors(evidence, association, model)
     ranges = of_pairs * _range_errors(evidence, association, model)
-    named = names * sum_products("kd,cd->kc", by_detection, detections.scores)
+    by_name = names * sum_products("kd,cd->kc", by_detection, detections.scores)
     amounts = [(kind, row) for row in (*turns, *ranges)]
     amounts += [(evidence.kinds, row) for row in (*hits.T, *trials.T)]
     sums = [np.bincount(kinds, row, size) for kinds, row in amounts]
@@ -284,8 +284,8 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
         hits=hits,
         trials=trials,
         false=false.T,
-        named=named,
-        totals=np.column_stack([named, false.sum(axis=1), *sums]),
+        named=by_name,
+        totals=np.column_stack([by_name, false.sum(axis=1), *sums]),
         log_likelihood=float(logliks.sum()),
     )
 

@@ -148,16 +148,16 @@ def goodness_of_fit(
         for row, error, scores in zip(rows.tolist(), errors, detections.scores.T, strict=True):
             blurred_mean, logs = means[error], logs_of[error]
             # Of an unknown class, or any of some, only the direction is compared.
-            named = scores > 0.0
-            same = (scores[named] == scores[named][0]).all()
-            share = scores[named][0] if same else 1.0
+            choices = scores > 0.0
+            same = (scores[choices] == scores[choices][0]).all()
+            share = scores[choices][0] if same else 1.0
             total += math.log(scores @ blurred_mean[:, row] / share)
             bins = []
             for chances, count in zip(sums[error], counts.tolist(), strict=True):
                 bins.append(np.searchsorted(chances, random.random(count) * chances[-1]))
-            if (same and named.sum() > 1) or named.all():
-                any_of_them = np.log(blurred_mean[named].sum(axis=0))
-                logs = np.where(named[:, None], any_of_them, logs)
+            if (same and choices.sum() > 1) or choices.all():
+                any_of_them = np.log(blurred_mean[choices].sum(axis=0))
+                logs = np.where(choices[:, None], any_of_them, logs)
             simulated += logs[:, inside].ravel()[np.concatenate(bins)]
     return float(np.mean(simulated <= total + ROUNDING))
 

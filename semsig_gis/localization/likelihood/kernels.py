@@ -452,7 +452,7 @@ def count_types(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
         factorials[value] = factorials[value - 1] + math.log(value)
     share = (size - query[kinds]) / size  # of detections of known class
     counts = np.empty(kinds, np.int64)
-    seen = np.empty(kinds, np.int64)  # classes of a sequence, ascending
+    here = np.empty(kinds, np.int64)  # classes of a sequence, ascending
     for row in range(len(scores)):
         length = min(offsets[row + 1] - offsets[row], len(detected) - 1)
         counts[:] = 0
@@ -461,17 +461,17 @@ def count_types(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
         different = 0
         for kind in range(kinds):
             if counts[kind] > 0:
-                seen[different] = kind
+                here[different] = kind
                 different += 1
         total = 0.0
         unnamed = 0.0  # expected detections of any name
         # Each name: the number that the query has, over all splits into right and wrong names.
         for name in range(kinds):
             stray = clutter[name]  # expected detections of other things under this name
-            for kind in seen[:different]:
+            for kind in here[:different]:
                 if kind != name:
-                    named = misnamed[length, kind] * others[kind, name]
-                    stray += counts[kind] * detected[length, kind] * named
+                    chance = misnamed[length, kind] * others[kind, name]
+                    stray += counts[kind] * detected[length, kind] * chance
             unnamed += clutter[name] + counts[name] * detected[length, name]
             stray *= share
             chance = share * detected[length, name] * (1.0 - misnamed[length, name])

@@ -31,7 +31,7 @@ def noise_by_class(noise: Noise, taxonomy: Taxonomy, present: Collection[int]) -
     for item in taxonomy.classes:
         if item.family:
             families.setdefault(item.family, []).append(item.name)
-    seen = {item.name for item in taxonomy.classes if item.code in present}
+    visible = {item.name for item in taxonomy.classes if item.code in present}
 
     def change(spec: NoiseSpec) -> NoiseSpec:
         tables = [getattr(spec, name) for name in (*BY_CLASS, "confusion", "fading")]
@@ -47,9 +47,9 @@ def noise_by_class(noise: Noise, taxonomy: Taxonomy, present: Collection[int]) -
             spec,
             **values,
             fading=_for_each(spec.fading, families),
-            clutter_shares=_divided(spec.clutter_shares, families, seen),
+            clutter_shares=_divided(spec.clutter_shares, families, visible),
             confusion={
-                name: _divided(row, families, seen)
+                name: _divided(row, families, visible)
                 for name, row in _for_each(spec.confusion, families).items()
             },
         )
@@ -66,13 +66,15 @@ def _for_each(values: Mapping[str, _Value], families: _Families) -> dict[str, _V
     return by_class
 
 
-def _divided(shares: Mapping[str, float], families: _Families, seen: set[str]) -> dict[str, float]:
+def _divided(
+    shares: Mapping[str, float], families: _Families, visible: set[str]
+) -> dict[str, float]:
     """Return shares with those of families divided among their classes."""
     by_class = {name: share for name, share in shares.items() if name not in families}
     for name, share in shares.items():
         all_classes = families.get(name, [])
         rest = [item for item in all_classes if item not in shares]
-        parts = [item for item in rest if item in seen] or rest or all_classes
+        parts = [item for item in rest if item in visible] or rest or all_classes
         for item in parts:
             by_class[item] = by_class.get(item, 0.0) + share / len(parts)
     return by_class

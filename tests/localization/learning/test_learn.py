@@ -496,8 +496,8 @@ def test_what_is_learned_of_a_family_is_for_its_other_classes() -> None:
         view = View.of(database.signature(cell))
         codes = view.class_scores().argmax(axis=1)
         # Half of the shops are overlooked.
-        kept = (codes > 2) | (np.arange(len(codes)) % 2 == 0)
-        samples.append(Sample(signature=view.select(kept), cell_id=int(database.cell_ids[cell])))
+        mask = (codes > 2) | (np.arange(len(codes)) % 2 == 0)
+        samples.append(Sample(signature=view.select(mask), cell_id=int(database.cell_ids[cell])))
     spec = learn_noise(samples, database).spec
     shop, food = (spec.detection_by_class[family] for family in ("shop", "food"))
     assert shop < 0.7

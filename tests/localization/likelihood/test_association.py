@@ -136,13 +136,13 @@ def slow_weights(
     kinds = table.row_of[database.codes[part]]
     sigmas = table.sigmas[kinds, database.distance_units[part]]
     names, length = table.query_rows(query), len(kinds)
-    named = np.append(table.named(length), np.ones((len(table.codes), 1)), axis=1) / table.density
+    chances = np.append(table.named(length), np.ones((len(table.codes), 1)), axis=1) / table.density
     weights = np.zeros((length, len(query)))
     for entry, detection in np.ndindex(weights.shape):
         bearing = database.bearings[part][entry] + 0.025
         weights[entry, detection] = (
             table.odds[length, kinds[entry]]
-            * named[kinds[entry], names[detection]]
+            * chances[kinds[entry], names[detection]]
             * bearing_density(
                 float(query_bearings(query)[detection] - bearing), float(sigmas[entry])
             )

@@ -50,7 +50,7 @@ def view_from(place: np.ndarray, rng: np.random.Generator) -> View:
     return View(np.full(len(away), TOWER.code, np.uint8), (bearings % 360.0)[order])
 
 
-def test_bearings_of_three_landmarks_alone_give_the_place(
+def test_bearings_of_only_three_landmarks_give_the_place(
     towers: StreetObjects, far_city: SignatureDatabase
 ) -> None:
     rng = np.random.default_rng(36)
