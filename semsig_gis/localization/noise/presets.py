@@ -25,9 +25,9 @@ def named_noise(name: str) -> Noise:
     ----------
     name : {"light", "medium", "strong", "generic", "by-hand", "photo", "panorama"}
         A level of the source's distortion, ``"generic"`` if the level is not known, or
-        ``"by-hand"`` for a person, who marks or names some of the visible objects: nine, six or
-        three in ten. ``"photo"`` and ``"panorama"`` are for detections in such pictures, by a
-        machine or a careful person.
+        ``"by-hand"`` for a person, who marks or names some of the visible objects: nine, six,
+        three or one in ten. ``"photo"`` and ``"panorama"`` are for detections in such pictures,
+        by a machine or a careful person.
 
     Returns
     -------
@@ -98,7 +98,7 @@ _MARKED = tuple(
     NoiseSpec(
         detection=share, misnamed=0.02, clutter=0.1, bearing_sigma=4.0, name=f"{share:g} marked"
     )
-    for share in (0.9, 0.6, 0.3)
+    for share in (0.9, 0.6, 0.3, 0.1)
 )
 NOISES: Mapping[str, Noise] = MappingProxyType(
     {

@@ -310,13 +310,13 @@ def _known_sentences(knowledge: Mapping[str, Any]) -> Iterator[str]:
 def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
     """Return an object of a query: ``street light at 80° ± 13° 7.3 m away``."""
     parts = []
-    one = view.select(np.array([row]))
-    scores = one.class_scores()[0].tolist()
+    item = view.select(np.array([row]))
+    scores = item.class_scores()[0].tolist()
     if len({*scores} - {0.0}) > 1:
         listed = ((taxonomy.words([code]), score) for code, score in enumerate(scores) if score)
         parts.append(" or ".join(f"{words} {score:.2g}" for words, score in listed))
     else:
-        parts += [taxonomy.title_of(name).lower() for name in one.class_names(taxonomy)]
+        parts += [taxonomy.title_of(name).lower() for name in item.class_names(taxonomy)]
     if view.bearings is not None:
         error = math.nan if view.bearing_errors is None else view.bearing_errors[row]
         spread = "" if math.isnan(error) else f" ± {error:.2g}°"
