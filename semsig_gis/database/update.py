@@ -44,7 +44,7 @@ from semsig_gis.database.file import (
     read_manifest,
 )
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
-from semsig_gis.database.sightings import landmark_tops, measure_sightings
+from semsig_gis.database.sightings import measure_sightings
 from semsig_gis.database.store import save_with_store, stored_inputs
 from semsig_gis.database.tile_inputs import working_folder
 from semsig_gis.database.tiles import (
@@ -474,9 +474,7 @@ def _find_change(
 ) -> _Change:
     """Compare objects, and find the cells in range of a change; ranges are of the `database`."""
     changes = compare_objects(old, new)
-    other = _other_sights(old, new, changes.same)
-    old_rows = np.concatenate([changes.obsolete_rows, other[:, 0]])
-    new_rows = np.concatenate([changes.new_rows, other[:, 1]])
+    old_rows, new_rows = changes.obsolete_rows, changes.new_rows
     places = np.concatenate([old.xy[old_rows], new.xy[new_rows]])
     codes = np.concatenate([old.codes[old_rows], new.codes[new_rows]])
     tall = np.isin(codes, database.taxonomy.tall_codes)
@@ -497,31 +495,6 @@ def _find_change(
         kept=other_layers,
         notes=notes,
     )
-
-
-def _other_sights(
-    old: StreetObjects, new: StreetObjects, same: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Return the pairs of equal objects that are seen in another way now, shape (c, 2).
-
-    They belong to a thing with other points, or are landmarks of another height.
-    """
-    other = np.zeros(len(same), np.bool_)
-    parts = [
-        np.full(len(objects), -1) if objects.groups is None else objects.groups
-        for objects in (old, new)
-    ]
-    # Equal things have equal numbers if the first of their points numbers them.
-    numbers = []
-    for groups, rows in zip(parts, same.T, strict=True):
-        _, first, thing = np.unique(groups[rows], return_index=True, return_inverse=True)
-        numbers.append(np.where(groups[rows] < 0, -1, first[thing]))
-    other |= numbers[0] != numbers[1]
-    tops = [landmark_tops(objects) for objects in (old, new)]
-    if tops[0] is not None and tops[1] is not None:
-        before, after = tops[0][same[:, 0]], tops[1][same[:, 1]]
-        other |= ~np.isnan(before) & (before != after)
-    return same[other]
 
 
 def _ids_in_range(

@@ -135,16 +135,13 @@ def _is_altered(
         )
         altered |= (first != second) & ~(np.isnan(first) & np.isnan(second))
     if old.groups is not None or new.groups is not None:
-        # Things are the same if each has all its points in common with just one thing.
-        groups = [
-            np.full(len(rows), -1) if item.groups is None else item.groups[rows]
-            for item, rows in sides
-        ]
-        pairs, pair = np.unique(np.stack(groups, axis=1), axis=0, return_inverse=True)
-        for side in (0, 1):
-            _, place, partners = np.unique(pairs[:, side], return_inverse=True, return_counts=True)
-            several = (partners[place] > 1) & (pairs[:, side] >= 0)
-            altered |= several[pair.ravel()]
+        # Equal things have equal numbers if the first of their points numbers them.
+        numbers = []
+        for item, rows in sides:
+            groups = np.full(len(rows), -1) if item.groups is None else item.groups[rows]
+            _, first_row, thing = np.unique(groups, return_index=True, return_inverse=True)
+            numbers.append(np.where(groups < 0, -1, first_row[thing]))
+        altered |= numbers[0] != numbers[1]
     return altered
 
 

@@ -515,7 +515,9 @@ class _Reader:
         query = self.query
         used = [self._is_on_object(row, text) for row, text in enumerate(query.text_rows)]
         others = [text for text, on in zip(query.text_rows, used, strict=True) if text and not on]
-        self.signs = [text for text in (*others, *query.signs) if self._fits_any(text)]
+        # A street has the same sign at each corner, so that a second reading says nothing new.
+        signs = dict.fromkeys((*others, *query.signs))
+        self.signs = [text for text in signs if self._fits_any(text)]
         usable = query.among(self.index.database.present_codes)
         rows = np.flatnonzero(usable | np.array(used, np.bool_))
         texts = tuple(text if on else "" for text, on in zip(query.text_rows, used, strict=True))
