@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 
 from semsig_gis.core import (
     BEARING_UNITS,
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
 # The arrays of a block fit into the cache of a processor.
 CELLS_PER_BLOCK = 1 << 14
 PAIRS_PER_BLOCK = 1 << 20
+LANDMARK_CELLS_M = 100.0
 SQUARE_CELLS = 16  # side of the squares of cells for which the R-tree is searched
 # Measured: bytes per block, cell and sighting until they are saved, and seconds per sighting
 # without and with buildings.
@@ -128,7 +130,7 @@ def build_database(
     grid, spec = grid or GridSpec(), spec or SignatureSpec()
     database = build_cells(
         objects,
-        *cells_in_range(objects, grid=grid, spec=spec),
+        *cells_near(objects.xy, grid=grid, radius=cell_reach(objects.taxonomy, spec.radius)),
         grid=grid,
         spec=spec,
         viewpoints=viewpoints,
@@ -222,15 +224,13 @@ def build_cells(
     footprints: gpd.GeoDataFrame | None = None,
     streets: gpd.GeoDataFrame | None = None,
     partial: bool = False,
-    box: NDArray[np.float64] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> SignatureDatabase:
     """Compute the signatures of some cells; `objects` must include all that they can see.
 
     The cells are distinct and ordered by column and row. The result has the cells that are
     viewpoints and see an object, possibly none. If the cells are only a `partial` city, buildings
-    and streets may be empty tables, and `box` is that of the whole city (`city_box`): cells outside
-    of it that see only landmarks are left out. All else is as in `build_database`.
+    and streets may be empty tables. All else is as in `build_database`.
     """
     viewpoints = viewpoints or ViewpointSpec()
     buildings = None
@@ -263,14 +263,18 @@ def build_cells(
     columns, rows = columns[mask], rows[mask]
     tops = landmark_tops(objects)
     if tops is not None:
-        if box is None:
-            box = city_box(objects.xy, objects.taxonomy, spec.radius)
-        inside = in_box(grid.viewpoints(columns, rows), box)
+        # Cells farther from all objects would see only landmarks.
+        near, _ = shapely.STRtree(shapely.points(objects.xy)).query_nearest(
+            shapely.points(grid.viewpoints(columns, rows)),
+            max_distance=cell_reach(objects.taxonomy, spec.radius),
+            all_matches=False,
+        )
+        columns, rows = columns[near], rows[near]
     # Lengths, codes, bearings, distances and extents of each block; the first, empty block has the
     # types.
     kinds = (np.int64, np.uint8, np.uint16, np.uint8, np.uint8)
     blocks = [tuple(np.empty(0, kind) for kind in kinds)]
-    for cells, sightings in sightings_by_block(
+    for cells, pairs in sightings_by_block(
         columns,
         rows,
         objects.xy,
@@ -280,11 +284,6 @@ def build_cells(
         groups=objects.groups,
         tops=tops,
     ):
-        pairs = sightings
-        if tops is not None:
-            stays = inside[cells].copy()
-            stays[pairs.viewpoint[np.isnan(tops[pairs.object])]] = True
-            pairs = pairs.take(stays[pairs.viewpoint])
         order = clockwise_order(pairs, codes)
         units = np.floor(pairs.bearing * (BEARING_UNITS / 360.0))
         extent = np.empty(0) if pairs.extent is None else pairs.extent[order]
@@ -325,46 +324,14 @@ def build_cells(
     )
 
 
-def city_box(xy: NDArray[np.float64], taxonomy: Taxonomy, radius: float) -> NDArray[np.float64]:
-    """Return the box of objects, widened by the longest range of those that are not tall.
+def cell_reach(taxonomy: Taxonomy, radius: float) -> float:
+    """Return the largest distance in metres of a cell from an object, of any class.
 
-    It is ``xmin, ymin, xmax, ymax`` in metres. Cells outside of it have no landmarks.
+    It is the longest range of the classes that are not tall. Where landmarks are seen, it is at
+    least `LANDMARK_CELLS_M`: beyond, as in open country or at sea, few views are taken.
     """
-    margin = taxonomy.near_reach(radius)
-    return np.append(xy.min(axis=0) - margin, xy.max(axis=0) + margin)
-
-
-def in_box(xy: NDArray[np.float64], box: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return a mask of the places, shape (n, 2), in a box or on its edge."""
-    inside: NDArray[np.bool_] = np.logical_and.reduce((xy >= box[:2]) & (xy <= box[2:]), axis=1)
-    return inside
-
-
-def cells_in_range(
-    objects: StreetObjects,
-    *,
-    grid: GridSpec,
-    spec: SignatureSpec,
-    box: NDArray[np.float64] | None = None,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the columns and rows of the cells that may see an object, ordered by column and row.
-
-    Those that see only landmarks are in `box`, by default that of the objects (`city_box`).
-    """
-    xy, taxonomy = objects.xy, objects.taxonomy
-    tall = np.isin(objects.codes, taxonomy.tall_codes)
-    reach = taxonomy.near_reach(spec.radius)
-    if not tall.any():
-        return cells_near(xy, grid=grid, radius=reach)
-    if box is None:
-        box = city_box(xy, taxonomy, spec.radius)
-    furthest = float(taxonomy.ranges(spec.radius)[objects.codes[tall]].max())
-    columns, rows = cells_near(xy[tall], grid=grid, radius=furthest)
-    inside = in_box(grid.viewpoints(columns, rows), box)
-    ids = cell_ids(columns[inside], rows[inside])
-    if not tall.all():
-        ids = np.union1d(ids, cell_ids(*cells_near(xy[~tall], grid=grid, radius=reach)))
-    return split_ids(ids)
+    reach = taxonomy.near_reach(radius)
+    return max(reach, LANDMARK_CELLS_M) if len(taxonomy.tall_codes) else reach
 
 
 def expected_pairs(

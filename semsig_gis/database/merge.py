@@ -16,8 +16,9 @@ from semsig_gis.core import (
     LICENSES,
     DatabaseError,
     Displayed,
+    cells_near,
 )
-from semsig_gis.database.cells import build_cells, cells_in_range, city_box, in_box
+from semsig_gis.database.cells import build_cells, cell_reach
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import join_databases, require_same
 from semsig_gis.database.occlusion import MARGIN_M, footprints_around
@@ -149,12 +150,7 @@ def merge_databases(
     around = max(template.reach, widest) + MARGIN_M
     low = np.maximum(*(box[:2] for box in map(_bounds, used_parts))) - around
     high = np.minimum(*(box[2:] for box in map(_bounds, used_parts))) + around
-    # Landmarks of one may be seen from cells that are in the box of both, but of neither of them.
-    boxes = [
-        city_box(part.objects.xy, template.taxonomy, template.spec.radius)
-        for part in (used, *used_parts)
-    ]
-    recomputed = _build_box(template, used, low, high, boxes=boxes, progress=progress)
+    recomputed = _build_box(template, used, low, high, progress=progress)
     parts = [part.select(~_within(part.xy, low, high)) for part in databases]
     merged = replace(join_databases([*parts, recomputed]), **facts)
     save_with_store(merged, store, out)
@@ -218,14 +214,9 @@ def _build_box(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
     *,
-    boxes: Sequence[NDArray[np.float64]],
     progress: Callable[[int, int], None] | None,
 ) -> SignatureDatabase:
-    """Return the cells in a box, computed from a store with the settings of a database.
-
-    `boxes` are those of all objects and of the objects of both databases. If there are landmarks,
-    the cells in the first but in none of the others are computed too.
-    """
+    """Return the cells in a box, computed from a store with the settings of a database."""
     reach, grid = template.reach, template.grid
     has_landmarks = bool(len(template.taxonomy.tall_codes))
     objects, footprints = store.objects, store.footprints
@@ -234,11 +225,9 @@ def _build_box(
         objects = replace(objects, table=objects.table[near])
     if not len(objects):
         return template.select(slice(0))
-    columns, rows = cells_in_range(objects, grid=grid, spec=template.spec, box=boxes[0])
-    places = grid.viewpoints(columns, rows)
-    inside = _within(places, low, high)
-    if has_landmarks:
-        inside |= ~(in_box(places, boxes[1]) | in_box(places, boxes[2]))
+    furthest = cell_reach(objects.taxonomy, template.spec.radius)
+    columns, rows = cells_near(objects.xy, grid=grid, radius=furthest)
+    inside = _within(grid.viewpoints(columns, rows), low, high)
     if footprints is not None and not has_landmarks:
         around = [*(low - reach), *(high + reach)]
         footprints = footprints_around(partial(_meeting, footprints), around)
@@ -252,7 +241,6 @@ def _build_box(
         footprints=footprints,
         streets=store.streets,
         partial=True,
-        box=boxes[0],
         progress=progress,
     )
 

@@ -6,7 +6,6 @@ are finished, the folder is renamed to ``OUT``.
 
 from __future__ import annotations
 
-import itertools
 import os
 import shutil
 from collections import Counter
@@ -29,6 +28,7 @@ from semsig_gis.core import (
     SignatureSpec,
     announce,
     cell_ids,
+    cells_near,
     check_workers,
     consecutive,
     finish_tasks,
@@ -40,8 +40,7 @@ from semsig_gis.database.cells import (
     HIDDEN_PAIR_S,
     PAIR_S,
     build_cells,
-    cells_in_range,
-    city_box,
+    cell_reach,
     expected_pairs,
     require_room,
 )
@@ -82,7 +81,6 @@ if TYPE_CHECKING:
     import geopandas as gpd
     from numpy.typing import NDArray
 
-    from semsig_gis.core import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.tile_inputs import Input
     from semsig_gis.objects import StreetObjects
@@ -258,7 +256,6 @@ def build_parts(
     copies = copies or {}
     try:
         tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.near_reach)
-        tiles += _landmark_tiles(plan, tiles)
         others = [tile for tile in tiles if tile not in copies]
         results: dict[Tile, PartFile | None] = {**copies, **finished_tiles(plan.folder, others)}
         missing = [tile for tile in others if tile not in results]
@@ -335,8 +332,8 @@ class TilePlan:
 
     Part files are written to `folder`; all inputs can be read by box and are in one CRS. `side` is
     the side of a tile in cells; `reach` is the largest visibility range of any class, `near_reach`
-    that of classes that are not tall, and `street_reach` the largest half-width of a street, all in
-    metres. `city` is the box of all objects (`city_box`), None without landmarks.
+    the largest distance of a cell from an object (`cell_reach`), and `street_reach` the largest
+    half-width of a street, all in metres.
     """
 
     folder: Path
@@ -350,7 +347,6 @@ class TilePlan:
     reach: float
     near_reach: float
     street_reach: float = 0.0
-    city: Box | None = None
 
     def box(self, tile: Tile, margin: float) -> Box:
         """Return ``xmin, ymin, xmax, ymax`` of a tile, widened by `margin` metres on each side."""
@@ -415,8 +411,7 @@ def plan_tiles(
             viewpoints=viewpoints,
             side=tile.cells(grid),
             reach=reach,
-            near_reach=taxonomy.near_reach(spec.radius),
-            city=_city_of(files["objects"], taxonomy, spec.radius),
+            near_reach=cell_reach(taxonomy, spec.radius),
             street_reach=0.0 if lines is None else max(viewpoints.width, widest_street(lines)),
         )
     except BaseException:
@@ -424,39 +419,10 @@ def plan_tiles(
         raise
 
 
-def _city_of(path: Path, taxonomy: Taxonomy, radius: float) -> Box | None:
-    """Return the box of all objects in a file, widened as by `city_box`; None without landmarks."""
-    if not len(taxonomy.tall_codes):
-        return None
-    xmin, ymin, xmax, ymax = city_box(open_objects(path).xy, taxonomy, radius).tolist()
-    return xmin, ymin, xmax, ymax
-
-
-def _landmark_tiles(plan: TilePlan, tiles: Sequence[Tile]) -> list[Tile]:
-    """Return the further tiles with cells in range of a landmark, ordered by column and row."""
-    if plan.city is None:
-        return []
-    objects = open_objects(plan.objects)
-    tall = np.isin(objects.codes, objects.taxonomy.tall_codes)
-    side = plan.side * plan.grid.step
-    low, high = np.array(plan.city).reshape(2, 2)
-    further: set[Tile] = set()
-    for place in objects.xy[tall]:
-        corners = np.clip([place - plan.reach, place + plan.reach], low, high)
-        first, last = np.floor((corners - plan.grid.origin) / side).astype(np.int64).tolist()
-        columns, rows = (range(first[axis], last[axis] + 1) for axis in (0, 1))
-        further.update(itertools.product(columns, rows))
-        if len(further) > MOST_TILES:
-            raise InputError(
-                f"tiles of {side:g} m would be more than {MOST_TILES:,}; make them larger."
-            )
-    return sorted(further.difference(tiles))
-
-
 def _objects_around(plan: TilePlan, tile: Tile) -> StreetObjects:
     """Return the objects that the cells of a tile may see."""
     objects = open_objects(plan.objects, box=plan.box(tile, plan.reach + MARGIN_M))
-    if plan.city is None:
+    if not len(objects.taxonomy.tall_codes):
         return objects
     west, south, east, north = plan.box(tile, plan.near_reach + MARGIN_M)
     x, y = objects.xy.T
@@ -520,9 +486,8 @@ def tile_cells(
     objects = _objects_around(plan, tile)
     if not len(objects):
         return None
-    city = None if plan.city is None else np.array(plan.city)
     if only is None:
-        columns, rows = cells_in_range(objects, grid=plan.grid, spec=plan.spec, box=city)
+        columns, rows = cells_near(objects.xy, grid=plan.grid, radius=plan.near_reach)
         inside = (columns // plan.side == tile[0]) & (rows // plan.side == tile[1])
         columns, rows = columns[inside], rows[inside]
     else:
@@ -531,7 +496,8 @@ def tile_cells(
     footprints = streets = None
     if plan.buildings is not None:
         # Roofs farther away than other objects may hide a landmark.
-        hiding = plan.near_reach if city is None else max(plan.near_reach, SHADOW_M)
+        tall = objects.taxonomy.tall_codes
+        hiding = max(plan.near_reach, SHADOW_M) if len(tall) else plan.near_reach
         around = plan.box(tile, hiding + MARGIN_M)
         footprints = footprints_around(
             lambda box: read(plan.buildings, role="buildings", box=box), around
@@ -549,7 +515,6 @@ def tile_cells(
         footprints=footprints,
         streets=streets,
         partial=True,
-        box=city,
     )
 
 

@@ -27,7 +27,7 @@ from semsig_gis.core import (
     percent,
     split_ids,
 )
-from semsig_gis.database.cells import build_cells, city_box, in_box
+from semsig_gis.database.cells import build_cells, cell_reach
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import (
     ENTRY_ARRAYS,
@@ -436,12 +436,11 @@ class _Change:
     """The difference between the objects of a database and the new objects.
 
     `places`, shape (c, 2) in metres, are the positions of removed and added objects that are not
-    landmarks; `cell_ids`, ascending, are the cells in range of one or of a changed landmark. `box`
-    is that of the new objects. The other fields are as in `UpdateReport`.
+    landmarks; `cell_ids`, ascending, are the cells in range of one or of a changed landmark. The
+    other fields are as in `UpdateReport`.
     """
 
     places: NDArray[np.float64]
-    box: NDArray[np.float64]
     cell_ids: NDArray[np.int64]
     classes: tuple[ClassChange, ...]
     replaced: tuple[str, ...]
@@ -478,17 +477,14 @@ def _find_change(
     places = np.concatenate([old.xy[old_rows], new.xy[new_rows]])
     codes = np.concatenate([old.codes[old_rows], new.codes[new_rows]])
     tall = np.isin(codes, database.taxonomy.tall_codes)
-    boxes = [city_box(part.xy, database.taxonomy, database.spec.radius) for part in (old, new)]
+    # A new object may bring cells that see only landmarks.
     ids = np.union1d(
         _ids_in_range(database, places[~tall], codes[~tall]),
         _ids_in_range(database, places[tall], codes[tall]),
     )
-    if len(database.taxonomy.tall_codes) and (boxes[0] != boxes[1]).any():
-        ids = np.union1d(ids, _ids_between(database, (old, new), boxes))
     layers = {*old.table[SOURCE].unique(), *new.table[SOURCE].unique()}
     return _Change(
         places=places[~tall],
-        box=boxes[1],
         cell_ids=ids,
         classes=changes.classes,
         replaced=tuple(sorted(layers - {*other_layers})),
@@ -503,7 +499,10 @@ def _ids_in_range(
     """Return the ids of the cells in range of objects, ascending."""
     if not len(places):
         return np.empty(0, np.int64)
-    ranges = database.taxonomy.ranges(database.spec.radius)[codes]
+    taxonomy, radius = database.taxonomy, database.spec.radius
+    ranges = taxonomy.ranges(radius)[codes]
+    if len(taxonomy.tall_codes):
+        ranges = np.maximum(ranges, cell_reach(taxonomy, radius))
     reach = float(ranges.max())
     columns, rows = cells_near(places, grid=database.grid, radius=reach)
     index, near = PackedIndex(places), []
@@ -516,21 +515,6 @@ def _ids_in_range(
         near.append(start + np.unique(sightings.viewpoint))
     cells = np.concatenate(near)
     return cell_ids(columns[cells], rows[cells])
-
-
-def _ids_between(
-    database: SignatureDatabase,
-    parts: tuple[StreetObjects, StreetObjects],
-    boxes: list[NDArray[np.float64]],
-) -> NDArray[np.int64]:
-    """Return the ids of the cells in range of a landmark that are in only one of two boxes."""
-    parts_of_boxes = []
-    for objects in parts:
-        tall = np.isin(objects.codes, database.taxonomy.tall_codes)
-        ids = _ids_in_range(database, objects.xy[tall], objects.codes[tall])
-        inside = [in_box(database.grid.viewpoints(*split_ids(ids)), box) for box in boxes]
-        parts_of_boxes.append(ids[inside[0] != inside[1]])
-    return np.union1d(*parts_of_boxes)
 
 
 def _hiding(database: SignatureDatabase, store: ObjectStore) -> gpd.GeoDataFrame | None:
@@ -569,7 +553,6 @@ def _recompute(
         footprints=footprints,
         streets=store.streets,
         partial=True,
-        box=change.box,
         progress=progress,
     )
 

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from semsig_gis.objects import StreetObjects
 
 TOWER = ObjectClass(232, "T", "tower", "Tower", range_m=2000.0, tall=True)
+# Cells are within 100 m of an object; these are too small to be seen from most of them.
+STONE = ObjectClass(233, "S", "stone", "Stone", range_m=1.0)
+STONES = [(x, y) for x in range(0, 1401, 140) for y in range(0, 1201, 140)]
 TOWERS = np.array([[0.0, 0.0], [1400.0, 100.0], [500.0, 1200.0]])
 NOISE = NoiseSpec(detection=0.9, misnamed=0.02, clutter=0.1, bearing_sigma=1.5)
 
@@ -34,7 +37,8 @@ NOISE = NoiseSpec(detection=0.9, misnamed=0.02, clutter=0.1, bearing_sigma=1.5)
 @pytest.fixture(scope="module")
 def towers() -> StreetObjects:
     things = [(x, y, TOWER.code, "map", str(row)) for row, (x, y) in enumerate(TOWERS.tolist())]
-    taxonomy = paper_taxonomy().extended([TOWER])
+    things += [(x, y, STONE.code, "map", f"{x} {y}") for x, y in STONES]
+    taxonomy = paper_taxonomy().extended([TOWER, STONE])
     return objects_of(*things, licenses=(), taxonomy=taxonomy)
 
 
