@@ -264,7 +264,7 @@ def build_cells(
     tops = landmark_tops(objects)
     if tops is not None:
         # Cells farther from all objects would see only landmarks.
-        near, _ = shapely.STRtree(shapely.points(objects.xy)).query_nearest(
+        near, _ = shapely.STRtree(np.asarray(shapely.points(objects.xy))).query_nearest(
             shapely.points(grid.viewpoints(columns, rows)),
             max_distance=cell_reach(objects.taxonomy, spec.radius),
             all_matches=False,
