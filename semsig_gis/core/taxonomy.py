@@ -93,7 +93,7 @@ class ObjectClass:
     height_m: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
     height_sigma: Annotated[float, metres(MAX_HEIGHT_M)] | None = None
     family: Annotated[
-        str, matching("[a-z][a-z0-9_]*|", "lower-case letters, digits and underscores")
+        str, matching("([a-z][a-z0-9_]*)?", "lower-case letters, digits and underscores")
     ] = field(default="", compare=False)
     shape: Shape = field(default="point", compare=False)
     tall: Flag = False

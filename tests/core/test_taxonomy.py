@@ -56,6 +56,7 @@ OTHER = ObjectClass(1, "B", "tree", "Tree")
 BAD_CODES = (0, -1, 256, 1.0, True, "1", None)
 BAD_SYMBOLS = ("", "BB", "日", "-", " ", "B\n", "٣", 5, None)
 BAD_NAMES = ("", "Tree", "tree-1", "1tree", "arbre à fruits", "tree\n", 7)
+BAD_FAMILIES = ("Shop", "!!!", "shop ", 7)
 
 
 @pytest.mark.parametrize(
@@ -67,6 +68,7 @@ BAD_NAMES = ("", "Tree", "tree-1", "1tree", "arbre à fruits", "tree\n", 7)
             for bad in BAD_SYMBOLS
         ),
         *(("name", bad, (repr(bad), "lower-case")) for bad in BAD_NAMES),
+        *(("family", bad, (repr(bad), "lower-case")) for bad in BAD_FAMILIES),
     ],
 )
 def test_invalid_code_symbol_or_name_is_refused(
