@@ -22,7 +22,7 @@ from semsig_gis.core import (
     wrap_degrees,
     wrapped_bearings,
 )
-from semsig_gis.observation.spoken import read_sentence
+from semsig_gis.observation.spoken import METRES, read_sentence
 from semsig_gis.observation.view import CLASSES, ROUNDING, Photo, View
 from semsig_gis.observation.vocabulary import Vocabulary
 from semsig_gis.sources import class_codes
@@ -62,7 +62,8 @@ UNKNOWN = (None, "", "?", "nan")
 
 _NUMBER = r"[-+]?\d+(?:\.\d*)?"
 _METRES = re.compile(
-    rf"(?P<within>within\s+)?(?:about\s+|~\s*)?(?P<metres>{_NUMBER})\s*(?:m|met(?:re|er)s?)?"
+    rf"(?P<within>within\s+)?(?:about\s+|~\s*)?(?P<metres>{_NUMBER})\s*"
+    r"(?:(?P<kilo>k|kilo)?(?:m|met(?:re|er)s?))?"
     r"(?:\s+away)?",
     re.IGNORECASE,
 )
@@ -151,6 +152,11 @@ def parse_seen(row: Row, *, taxonomy: Taxonomy, radius: float) -> tuple[View, Co
         rows = mappings(values["photos"], "photos")
         for photo in rows:
             require_seen(photo)
+        signs = list(_texts(values, "signs"))  # those of all photos, kept with the first
+        rows = [
+            {**photo, "signs": [*signs, *_texts(photo, "signs")]} if not row and signs else photo
+            for row, photo in enumerate(rows)
+        ]
         views = [parse_view(shared | photo, taxonomy=taxonomy, radius=radius) for photo in rows]
         if not views or (len(views) > 1 and any(view.bearings is None for view in views)):
             raise InputError(
@@ -258,7 +264,13 @@ def _columns_view(values: Row, taxonomy: Taxonomy, radius: float) -> View:
             "several photos were given, but not which one each object is in; give photo as well."
         )
     classes = np.full(len(plain), WILDCARD) if codes is None else codes
-    ranges, errors = _ranges(values, taxonomy.ranges(radius)[classes])
+    furthest = taxonomy.ranges(radius)
+    limits = np.stack([furthest[classes]] * 2, axis=1)
+    if scores is not None and len(scores) == len(plain):  # of all classes that it may be of
+        several = classes == WILDCARD
+        possible = np.where(scores[several] > 0, furthest, np.nan)
+        limits[several] = np.stack([np.nanmin(possible, 1), np.nanmax(possible, 1)], axis=1)
+    ranges, errors = _ranges(values, limits)
     return View.of(
         plain,
         ranges=ranges,
@@ -280,17 +292,7 @@ def _columns(items: Sequence[Row], values: Row, taxonomy: Taxonomy) -> Row:
     }
     if any(item.get("text") is not None for item in items):
         columns["texts"] = [item.get("text") for item in items]
-    classes: list[str | Row] = []
-    for value in (item.get("class") for item in items):
-        if not isinstance(value, (dict, str)):
-            raise InputError(
-                f"the class of a detection is {value!r}; give a symbol, a word or scores by word."
-            )
-        if isinstance(value, str):
-            codes = class_codes(value, taxonomy)  # one, or those of a family
-            symbols = [taxonomy.decode([code]) for code in codes]
-            value = symbols[0] if len(codes) == 1 else dict.fromkeys(symbols, 1.0 / len(codes))  # noqa: PLW2901
-        classes.append(value)
+    classes = [_class(item, taxonomy) for item in items]
     if any(isinstance(value, dict) for value in classes):
         columns["scores"] = [
             value if isinstance(value, dict) else {value: 1.0} for value in classes
@@ -322,6 +324,22 @@ def _columns(items: Sequence[Row], values: Row, taxonomy: Taxonomy) -> Row:
     return columns
 
 
+def _class(item: Row, taxonomy: Taxonomy) -> str | Row:
+    """Return the symbol of a detection's class, or scores by symbol."""
+    value = item.get("class")
+    if value is None and item.get("text") is not None:
+        value = "unknown"  # something that is known by what is written on it
+    if not isinstance(value, (dict, str)):
+        raise InputError(
+            f"the class of a detection is {value!r}; give a symbol, a word or scores by word."
+        )
+    if isinstance(value, dict):
+        return value
+    codes = class_codes(value, taxonomy)  # one, or those of a family
+    symbols = [taxonomy.decode([code]) for code in codes]
+    return symbols[0] if len(codes) == 1 else dict.fromkeys(symbols, 1.0 / len(codes))
+
+
 def _scores(chances: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:
     """Return the probability of each class code; the rest, up to one, is for any class."""
     scores = np.zeros(CLASSES)
@@ -338,13 +356,16 @@ def _scores(chances: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:
 
 
 def _ranges(
-    values: Row, furthest: NDArray[np.float64]
+    values: Row, limits: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
-    """Return ranges and errors, None if all are unknown; `furthest` are the visibility ranges."""
-    words = _column(values, "ranges", len(furthest))
-    pairs = [_range(word, far) for word, far in zip(words, furthest.tolist(), strict=True)]
+    """Return ranges and errors, None if all are unknown.
+
+    `limits` are the shortest and the longest visibility range of each object.
+    """
+    words = _column(values, "ranges", len(limits))
+    pairs = [_range(word, *pair) for word, pair in zip(words, limits.tolist(), strict=True)]
     ranges, guessed = np.array(pairs).reshape(-1, 2).T
-    own = _errors(values, "range_errors", len(furthest))
+    own = _errors(values, "range_errors", len(limits))
     errors = guessed if own is None else np.where(np.isnan(own), guessed, own)
     return (
         None if np.isnan(ranges).all() else ranges,
@@ -353,8 +374,12 @@ def _ranges(
 
 
 def _texts(values: Row, name: str) -> tuple[str, ...]:
-    """Return what was read, as text; a number is text as well, and None is nothing."""
+    """Return what was read, as text, or as a list of it.
+
+    A number is text as well, and None is nothing.
+    """
     items = values.get(name, [])
+    items = [items] if isinstance(items, str) else items
     if not isinstance(items, list) or any(isinstance(item, (list, dict)) for item in items):
         raise InputError(f"{name} were given as {items!r:.60}; give a list of text.")
     return tuple("" if item is None else str(item) for item in items)
@@ -382,17 +407,30 @@ def _column(values: Row, name: str, size: int) -> list[Any]:
     return column
 
 
-def _range(value: object, furthest: float) -> tuple[float, float]:
-    """Return a range and its error, NaN if they are unknown."""
+def _range(value: object, shortest: float, longest: float) -> tuple[float, float]:
+    """Return a range and its error, NaN if they are unknown.
+
+    A word such as "far" is for the rings of the shortest and of the longest visibility range.
+    """
     if value in UNKNOWN:
         return math.nan, math.nan
     if isinstance(value, (int, float)):
         return float(value), math.nan
     text = _spaced(str(value)).lower()
     if third := THIRDS.get(text):
-        return _ring_range(*(furthest * edge / 3.0 for edge in third))
+        ends = [
+            _ring_range(*(reach * edge / 3.0 for edge in third))
+            for reach in dict.fromkeys((shortest, longest))
+        ]
+        if len(ends) == 1:
+            return ends[0]
+        (low, low_error), (high, high_error) = ends
+        error = math.hypot(low_error, high_error) / math.sqrt(2.0)
+        return math.sqrt(low * high), math.hypot(error, math.log(high / low) / 2.0)
     match = _METRES.fullmatch(text)
     metres = float(match["metres"]) if match else 0.0
+    if match and match["kilo"]:
+        metres *= METRES["kilometres"]
     if match is None or not 0 < metres <= MAX_RANGE_M:
         raise InputError(
             f"range {value!r} cannot be read; give metres, 'within 12 m', 'near', 'middle' or "

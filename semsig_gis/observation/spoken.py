@@ -56,7 +56,10 @@ ANY_ERROR = FULL_TURN / 2.0
 
 RIGHT, HOURS = 90.0, 12
 MOST_COUNT = 20
-UNITS = frozenset({"metres", "degrees", "hours"})
+METRES = {"metres": 1.0, "kilometres": 1000.0}
+"""Metres of each unit of distance."""
+"""Metres of each unit of distance."""
+UNITS = frozenset({*METRES, "degrees", "hours"})
 # Attributes of `_Part` by kind of item: directions, and what a phrase says of the part.
 DIRECTIONS = {"compass": "points", "turn": "turns", "hours": "hours", "degrees": "degrees"}
 FLAGS = {"none": "absent", "or": "either", "facing": "facing", "within": "within"}
@@ -76,15 +79,17 @@ _TOKEN = re.compile(
     r"(?P<text>\"[^\"\n]+\"|[\u201c\u201e][^\u201c-\u201e\n]+[\u201c\u201d]"
     r"|\u00ab[^\u00ab\u00bb\n]+\u00bb|\u00bb[^\u00ab\u00bb\n]+\u00ab"
     r"|(?<!\w)['\u2018\u201a](?=[^\s'\u2019])[^\n]*?(?<=\S)['\u2018\u2019](?!\w))"
+    # A quotation mark that is not closed, and the word after it.
+    r"|(?P<open>(?:[\"\u201c\u201e\u00ab]|(?<!\w)['\u2018\u201a])[^\s'\u2019,;!.]+)"
     r"|(?P<tag>[\w:]+ ?= ?[\w:*]+)"
-    r"|(?P<number>\(\d+\)|(?<!\w)[-+]?\d+(?:\.\d+|,\d+(?=\s*(?:°|m\b|(?:met|mèt|deg|grad|grau))))?|\d+(?:\.\d+)?)"
+    r"|(?P<number>\(\d+\)|(?<!\w)[-+]?\d+(?:\.\d+|,\d+(?=\s*(?:°|k?m\b|(?:kil|quil|chil|met|mèt|deg|grad|grau))))?|\d+(?:\.\d+)?)"
     r"|(?P<word>[^\W\d_]+(?:_[^\W\d_]+)*|[°@?])"
     r"|(?P<end>[,;!.\n])"
 )
 # What is written on a house: 12, 12a, 12 bis, 12-14.
 _HOUSE = re.compile(
     r"\s*(?P<text>\d{1,5}(?:[a-z](?!\w)|\s?(?:bis|ter|quater)\b)?(?:[-/]\d{1,5}[a-z]?)?)"
-    r"(?![\w.,]*\w|\s*(?:°|m\b|met|mèt|deg|grad|grau))",
+    r"(?![\w.,]*\w|\s*(?:°|k?m\b|kil|quil|chil|met|mèt|deg|grad|grau))",
     re.IGNORECASE,
 )
 _UNCLEAR = re.compile(r"[()]|,\d{3}$")
@@ -151,7 +156,8 @@ def read_sentence(text: str, taxonomy: Taxonomy) -> Sentence:
     >>> sentence.unplaced, sentence.absent, sentence.notes
     ((3,), (1,), ("'green' was not used.",))
     """
-    tokens = [*_TOKEN.finditer(text.replace("º", "°"))]
+    matches = [*_TOKEN.finditer(text.replace("º", "°"))]
+    tokens = [match for match in matches if not match["open"]]
     vocabulary = Vocabulary.of([match["word"] for match in tokens if match["word"]], taxonomy)
     parts = [*_parts(_items(tokens, vocabulary, taxonomy), vocabulary, taxonomy)]
     look: Row = {}
@@ -165,7 +171,14 @@ def read_sentence(text: str, taxonomy: Taxonomy) -> Sentence:
     things = _things(parts, vocabulary)
     if text.strip() and not things:
         raise _without_thing(text)
-    return _sentence(things, look, taxonomy)
+    sentence = _sentence(things, look, taxonomy)
+    unclosed = (
+        f"the quotation mark before {match['open'][1:]!r} is not closed, so what was read was not "
+        "used."
+        for match in matches
+        if match["open"]
+    )
+    return replace(sentence, notes=(*unclosed, *sentence.notes))
 
 
 def _things(parts: Iterable[_Part], vocabulary: Vocabulary) -> list[_Part]:
@@ -180,6 +193,8 @@ def _things(parts: Iterable[_Part], vocabulary: Vocabulary) -> list[_Part]:
                 part.take(waiting)
                 part.led, waiting = True, None
             things.append(part)
+        elif part.fault is not None:
+            raise part.fault
         elif not part.says_where:
             continue
         elif last is not None and last.can_take(part):
@@ -338,7 +353,7 @@ def _items(
             if first and size == 1 and plain and text in symbols:
                 item = _Item("symbol", symbols[text], text)
         yield item
-        place += size
+        place += size + _is_possessive(item, tokens[place + size : place + size + 1])
         if item.value == HOUSE_NUMBER and (
             house := _HOUSE.match(token.string, tokens[place - 1].end())
         ):
@@ -347,6 +362,13 @@ def _items(
                 place += 1
         numbered = item.kind == "number"
         first = item.kind in SEPARATORS or (first and item.kind in {"skip", "number", "none"})
+
+
+def _is_possessive(item: _Item, following: Sequence[re.Match[str]]) -> bool:
+    """Return whether the s of a possessive follows, such as that of "baker's"."""
+    return item.kind in {"thing", "other"} and any(
+        token.group() == "s" and token.string[token.start() - 1] in "'\u2019" for token in following
+    )
 
 
 def _phrase(
@@ -560,7 +582,10 @@ class _Part:
         self.range = self.range or other.range
 
     def unit(self, number: _Item, before: str, following: Sequence[_Item]) -> str:
-        """Return the unit of a number without one: hours, degrees or a count of things."""
+        """Return the unit of a number without one: hours, degrees or a count of things.
+
+        A number that may be anything is left out, with its part.
+        """
         after = next((item.kind for item in following if item.kind not in {"skip", "at"}), "")
         if before == "clock":
             return "hours"
@@ -571,10 +596,12 @@ class _Part:
             return "count"
         if before == "turn":
             return "degrees"
-        raise InputError(
+        self.lost = f"the number {number.text} is not clear"
+        self.fault = InputError(
             f"the number {number.text} in {self.text!r} is not clear; write 'at 40' or '40 left' "
             f"for degrees, '40 m' for metres, or '4 benches', up to {MOST_COUNT}."
         )
+        return "skip"
 
     def add(self, item: _Item) -> None:
         """Add a phrase, a thing, or a number with its unit as its kind."""
@@ -599,8 +626,8 @@ class _Part:
             self.read = f"{self.read} {value}".strip()
         elif kind == "count":
             self.count = int(value)
-        elif kind == "metres":
-            self._add_metres(value)
+        elif kind in METRES:
+            self._add_metres(value * METRES[kind])
         elif kind == "range":
             self.range = self.range or value
 
@@ -611,6 +638,13 @@ class _Part:
 
     def check(self, vocabulary: Vocabulary, last: _Part | None) -> None:
         """Find what is not understood; InputError for several things, or contradictions."""
+        if self.fault is None:
+            self._check_thing(vocabulary)
+        if self.fault is None:
+            self._check_absent(last)
+
+    def _check_thing(self, vocabulary: Vocabulary) -> None:
+        """Find what is not understood, and several things."""
         if not self.things and self.read:
             self.things.append((WILDCARD,))
         if self.sign and not self.read and self.codes == (WILDCARD,):
@@ -627,8 +661,9 @@ class _Part:
                 f"{self.text!r} names several things; put a comma between them, and give each its "
                 "own direction."
             )
-        if self.fault is not None:
-            return
+
+    def _check_absent(self, last: _Part | None) -> None:
+        """Refuse a contradiction in what is not in sight."""
         if self.absent and WILDCARD in self.codes:
             raise _absent_unnamed(self.text)
         placed = self.says_where or self.near

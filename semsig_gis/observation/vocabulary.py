@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import re
 import tomllib
 import unicodedata
 from dataclasses import dataclass
@@ -35,6 +36,7 @@ LISTS = (
     "facing",
     "degrees",
     "metres",
+    "kilometres",
     "hours",
     "clock",
     "within",
@@ -85,10 +87,12 @@ Endings = tuple[tuple[str, str], ...]
 class Names:
     """The words for things in a language: `codes` by the words, joined.
 
-    `beginnings` are those of the words, and `endings` those of their forms.
+    `beginnings` are those of the words, and `endings` those of their forms. `edged` are the codes
+    by the words of phrases that begin or end with a letter or an article, such as "T junction".
     """
 
     codes: Mapping[str, Codes]
+    edged: Mapping[Words, Codes]
     beginnings: frozenset[str]
     endings: Endings
 
@@ -96,11 +100,15 @@ class Names:
     def of(cls, terms: Sequence[Term], language: str) -> Self:
         """Return the words of a language; the first meaning of each counts."""
         codes: dict[str, Codes] = {}
+        edged: dict[Words, Codes] = {}
         for name, codes_of_word, phrase in terms:
             if name == language and (joined := "".join(words_of(phrase))):
                 codes.setdefault(joined, codes_of_word)
+                words = tuple(re.findall(r"[^\W\d_]+", plain_word(phrase)))
+                if len(words) > 1 and _has_edge(words):
+                    edged.setdefault(words, codes_of_word)
         beginnings = frozenset(word[: end + 1] for word in codes for end in range(len(word)))
-        return cls(codes, beginnings, _endings(language))
+        return cls(codes, edged, beginnings, _endings(language))
 
     def find(self, words: Sequence[str]) -> Codes | None:
         """Return the codes for words of a thing, each in any form; None if it has no such words."""
@@ -114,6 +122,12 @@ class Names:
                 if (whole := start + base) in self.beginnings
             }
         return next((self.codes[whole] for whole in sorted(joined) if whole in self.codes), None)
+
+    def find_edged(self, words: Words) -> Codes | None:
+        """Return the codes for a phrase with a letter or an article at its beginning or end."""
+        *first, last = words
+        forms = ((*first, base) for base in sorted(_bases(last, self.endings)))
+        return next((self.edged[form] for form in forms if form in self.edged), None)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -156,8 +170,14 @@ class Vocabulary:
 
         `own` is whether the words must be of this language.
         """
-        tables = OWN if own else None
-        return _find(words, self.families[:tables]) or _find(words, self.classes[:tables])
+        kinds = self.families, self.classes
+        # The names of classes are English, and in English they go before words for several classes.
+        codes = _find(words, self.classes[:1]) if self.language == "en" else None
+        # Words of the language go before those of others: "Post" is no pole in German.
+        codes = codes or _find(words, self.families[:OWN]) or _exact(words, self.classes[:OWN])
+        for tables in kinds:
+            codes = codes or _find(words, tables[:OWN] if own else tables)
+        return codes
 
     def text_class(self, words: Sequence[str]) -> str | None:
         """Return the name of the class if words are for a street sign or a house number."""
@@ -183,24 +203,33 @@ class Vocabulary:
         return nearest_name(text, self.names)
 
 
+def _has_edge(words: Sequence[str]) -> bool:
+    """Return whether words begin or end with an article or a letter, such as S for south."""
+    return any(len(word) == 1 or not words_of(word) for word in (words[0], words[-1]))
+
+
 def _parts(words: Sequence[str]) -> list[str]:
     """Return the words of a thing as they are compared; none if they cannot be of one."""
-    parts = [words_of(word) for word in words]
-    # A thing does not begin or end with an article or a letter, such as S for south.
-    if not parts[0] or not parts[-1] or min(len(words[0]), len(words[-1])) == 1:
-        return []
-    return [*itertools.chain(*parts)]
+    # Few things begin or end with an article or a letter.
+    return [] if _has_edge(words) else [*itertools.chain(*map(words_of, words))]
+
+
+def _exact(words: Sequence[str], names: Sequence[Names]) -> Codes | None:
+    """Return the class codes for the words of a thing as they are, None if no names have them."""
+    joined = "".join(_parts(words))
+    return next(filter(None, (table.codes.get(joined) for table in names)), None)
 
 
 def _find(words: Sequence[str], names: Sequence[Names]) -> Codes | None:
     """Return the class codes for the words of a thing, None if no names have them."""
     parts = _parts(words)
-    joined = "".join(parts)
+    if not parts:
+        plain = tuple(map(plain_word, words))
+        return next(filter(None, (table.find_edged(plain) for table in names[:OWN])), None)
     # All words as they are go before their forms, which count only in the own language: "turn" is
     # a form of a German word for a door.
-    exact = (table.codes.get(joined) for table in names)
-    forms = (table.find(parts) for table in names[:OWN] if parts)
-    return next(filter(None, itertools.chain(exact, forms)), None)
+    forms = (table.find(parts) for table in names[:OWN])
+    return _exact(words, names) or next(filter(None, forms), None)
 
 
 @functools.lru_cache(maxsize=4096)

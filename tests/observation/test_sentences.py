@@ -22,11 +22,20 @@ from semsig_gis.observation import (
     parse_seen,
     parse_view,
     read_description,
+    read_sentence,
     text_row,
 )
-from semsig_gis.sources import built_in_taxonomy, data_folder, paper_taxonomy
+from semsig_gis.sources import (
+    built_in_taxonomy,
+    data_folder,
+    families,
+    family_words,
+    paper_taxonomy,
+    words_of,
+)
 
 if TYPE_CHECKING:
+    from semsig_gis.core import ObjectClass
     from semsig_gis.observation import View, ViewRecord
 
 TAXONOMY = built_in_taxonomy()
@@ -128,6 +137,32 @@ def test_far_depends_on_range_of_class() -> None:
     # A hydrant is seen from 15 m.
     assert (ranges / ranges[0]).tolist() == pytest.approx([1.0, 0.25, 1.0])
     assert 40.0 < ranges[0] < 60.0
+
+
+@pytest.mark.parametrize("word", ["near", "middle", "far"])
+@pytest.mark.parametrize("name", ["tower", "landmark", "building", "church"])
+def test_range_in_words_of_several_classes_spans_those_of_each(name: str, word: str) -> None:
+    every = families(TAXONOMY)
+    codes = every.get(name) or TAXONOMY.family_codes("worship")
+    names = [item.name for item in TAXONOMY.classes if item.code in set(codes)]
+
+    def moments(classes: dict[str, float]) -> tuple[float, float]:
+        view = read({"detections": [{"class": classes, "bearing": 1, "range": word}]})
+        return column(view, "ranges")[0], column(view, "range_errors")[0]
+
+    single = [moments({name: 1.0}) for name in names]
+    mean, error = moments(dict.fromkeys(names, 1.0 / len(names)))
+    for middle, own_error in single:
+        assert abs(math.log(mean / middle)) <= error
+        assert own_error <= error + 1e-9
+
+
+def test_kilometres() -> None:
+    for text in ("a church, 2 km away at 40", "Kirche bei 40 Grad, 2 Kilometer entfernt"):
+        assert understood_parts(text) == ["church at 40 2000 m"]
+    assert understood_parts("église à 40 degrés, 1,5 km") == ["church at 40 1500 m"]
+    for value in ("2 km", "2 kilometres away"):
+        assert column(read({"types": "D", "bearings": [1], "ranges": [value]}), "ranges") == 2000.0
 
 
 def test_given_error_has_priority_over_error_of_word() -> None:
@@ -410,6 +445,69 @@ def test_descriptions_without_words_are_refused(view: Any) -> None:  # noqa: ANN
     assert "nearest" not in str(caught.value)
 
 
+def only_classes(text: str) -> frozenset[str]:
+    """Return the names of the classes that the only thing of a sentence may be of."""
+    sentence = read_sentence(text, TAXONOMY)
+    (thing,) = sentence.row["detections"]
+    assert sentence.notes == ()
+    names = {item.symbol: item.name for item in TAXONOMY.classes}
+    return frozenset(names[symbol] for symbol in thing["class"])
+
+
+@pytest.mark.parametrize("item", TAXONOMY.classes, ids=lambda item: item.name)
+def test_title_and_name_are_of_their_class(item: ObjectClass) -> None:
+    for name in (item.title, item.name, item.name.replace("_", " ")):
+        assert only_classes(f"{name} at 40") == {item.name}, name
+
+
+DEGREES = {
+    "en": "at 40",
+    "de": "bei 40 Grad",
+    "fr": "à 40 degrés",
+    "es": "a 40 grados",
+    "it": "a 40 gradi",
+    "pt": "a 40 graus",
+}
+
+
+@pytest.mark.parametrize("language", DEGREES)
+def test_words_that_people_say_are_understood(language: str) -> None:
+    shared = {
+        (name, "".join(words_of(word))): {
+            item.name for item in TAXONOMY.classes if item.code in codes
+        }
+        for name, codes, word in family_words(TAXONOMY)
+    }
+    path = data_folder() / "keywords.toml"
+    for name, table in tomllib.loads(path.read_text("utf-8"))["classes"].items():
+        for word in table.get("said", {}).get(language, ()):
+            joined = "".join(words_of(word))
+            is_name = language == "en" and joined == name.replace("_", "")
+            expected = {name} if is_name else shared.get((language, joined), {name})
+            assert only_classes(f"{word} {DEGREES[language]}") == expected, word
+            assert name in expected
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("hairdresser's at 40", ["hairdresser at 40"]),
+        ("the florist\u2019s on the left", ["florist -90"]),
+        ("the butcher's shop at 40", ["butcher at 40"]),
+        ("there's a T-junction ahead", ["t_junction +0"]),
+        ("U-Bahn links", ["subway_entrance -90"]),
+        ("U-Bahn-Eingang links, Bank rechts", ["bench +90", "subway_entrance -90"]),
+        ("S-Bahnhof links", ["railway_station -90"]),
+        ("Laterne S", ["street_light at 180"]),
+        ("carrefour en T devant", ["t_junction +0"]),
+        ("la poste à gauche, un arbre", ["alignment_tree", "post_office -90"]),
+        ("Post bei 40 Grad", ["post_office at 40"]),
+    ],
+)
+def test_letters_and_possessives_in_words(text: str, parts: list[str]) -> None:
+    assert understood_parts(text) == parts
+
+
 def test_words_that_are_not_used_are_noted() -> None:
     assert read({"see": "green bench left"}).notes == ("'green' was not used.",)
     (note,) = read({"see": "bench at 10 m"}).notes
@@ -446,6 +544,12 @@ def test_things_that_only_other_maps_have_are_not_used(text: str, word: str) -> 
             "church at 30, blorb at 42, a bench at 50",
             ["bench at 50", "church at 30"],
             ["'blorb at 42' was not used, because 'blorb' is unknown; the nearest is"],
+        ),
+        ("lamp at 40, tree 120", ["street_light at 40"], ["because the number 120 is not clear"]),
+        (
+            "lamp 'Alko at 40",
+            ["street_light at 40"],
+            ["the quotation mark before 'Alko' is not closed"],
         ),
         ("lamp at abc", ["street_light"], ["'abc' was not used."]),
         ("lamp at 40 soon", ["street_light at 40"], ["'soon' was not used."]),
@@ -555,6 +659,13 @@ def test_text_of_a_detection() -> None:
     assert read({"detections": items}).texts == ("Aux 4 vents", "")
     view = read({"see": "bench at 40, a shop 'Sole'", "signs": ["Via Roma"]})
     assert view.signs == ("Via Roma", "Sole")
+    view = read({"detections": [{"text": "Sole", "bearing": 1}], "signs": "Via Roma"})
+    assert column(view, "codes").tolist() == [0]
+    assert (view.texts, view.signs) == (("Sole",), ("Via Roma",))
+    for photos in ([{"types": "D", "bearings": [1], "signs": ["Sole"]}], [{"see": "lamp at 1"}]):
+        view = read({"photos": photos * 2, "signs": ["Via Roma"]})
+        assert view.signs[0] == "Via Roma"
+        assert len(view) == 2
 
 
 @pytest.mark.parametrize(
