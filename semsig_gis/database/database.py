@@ -59,6 +59,7 @@ CellGeometry = Literal["polygon", "point"]
 CODES_PER_BLOCK = 1 << 16  # counting makes a number of eight bytes of each of them
 CELLS_PER_TABLE = 1 << 16  # small enough for Arrow's 32-bit list offsets
 LONGEST_SETTING = 80  # letters
+MOST_NAMES = 3  # of classes in a message
 
 # Attributes that are equal in databases built in the same way, and their names in messages.
 SETTINGS = {
@@ -374,8 +375,10 @@ def require_same(
     for name, title in SETTINGS.items():
         ours, theirs = getattr(first, name), getattr(other, name)
         if ours != theirs and (classes or name != "taxonomy"):
+            both = f"{_brief(ours)} and {_brief(theirs)}"
             raise DatabaseError(
-                f"the databases differ in their {title} ({_brief(ours)} and {_brief(theirs)}); "
+                f"the databases differ in their {title} "
+                f"({_other_classes(ours, theirs) if name == 'taxonomy' else both}); "
                 "build both in the same way."
             )
 
@@ -414,6 +417,23 @@ def rows_of_result(
             f"with, or make the {what} again."
         )
     return rows
+
+
+def _other_classes(first: Taxonomy, other: Taxonomy) -> str:
+    """Return how two taxonomies differ, in words."""
+    kinds = [{item.name: item for item in part.classes} for part in (first, other)]
+    text = " and ".join(f"{len(part):,}" for part in kinds)
+    for mine, others, title in ((*kinds, "first"), (*kinds[::-1], "other")):
+        if only := [name for name in mine if name not in others]:
+            text += f"; only the {title} has {_few(only)}"
+    altered = [name for name, item in kinds[0].items() if kinds[1].get(name, item) != item]
+    return f"{text}; not the same in both: {_few(altered)}" if altered else text
+
+
+def _few(names: Sequence[str]) -> str:
+    more = len(names) - MOST_NAMES
+    listed = ", ".join(names[:MOST_NAMES])
+    return f"{listed} and {more:,} more" if more > 0 else listed
 
 
 def _brief(value: object) -> str:

@@ -12,6 +12,7 @@ import lazy_loader
 import numpy as np
 
 from semsig_gis.core import HEIGHT, Displayed, InputError
+from semsig_gis.sources import heights_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -286,11 +287,13 @@ def _lines(
 
 
 def building_heights(buildings: gpd.GeoDataFrame) -> NDArray[np.float64] | None:
-    """Return the heights of buildings in metres, NaN if unknown; None without such a column."""
+    """Return the heights of buildings in metres, NaN if unknown; None without such a column.
+
+    They are rounded as in a store. A column of a user may be text.
+    """
     if HEIGHT not in buildings:
         return None
-    heights: NDArray[np.float64] = buildings[HEIGHT].to_numpy(np.float64, na_value=math.nan)
-    return heights
+    return heights_in(buildings[HEIGHT].to_numpy()).astype(np.float32).astype(np.float64)
 
 
 def _pairs_near(

@@ -216,6 +216,8 @@ def _stored(table: gpd.GeoDataFrame, crs: CRS, *names: str) -> gpd.GeoDataFrame:
     if NAME in columns:  # a file of a user may have names that are not text
         texts = [name if isinstance(name, str) else "" for name in columns[NAME]]
         columns[NAME] = np.array(texts, dtype=object)
+    if (heights := building_heights(rows)) is not None and HEIGHT in columns:
+        columns[HEIGHT] = heights.astype(np.float32)
     stored = gpd.GeoDataFrame(columns, geometry=rows.geometry.to_numpy(), crs=rows.crs)
     stored.attrs[LICENSES] = list(licenses_of(table))
     return stored

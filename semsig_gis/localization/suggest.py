@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -35,6 +36,8 @@ LOOKED_FOR = 0.95
 """Minimum probability that a person who looks for an object detects it."""
 EDGE = 5.0
 """Degrees at each edge of a photo in which objects do not count: its heading is only estimated."""
+HEAD_END, PLURAL = re.compile(" of | between | or |,"), re.compile("[^su]s$")
+"""What follows the noun of a title, and the end of a noun in the plural."""
 MOST_CELLS = 20_000
 """Most cells, the likeliest ones, in which the sectors of a view are compared."""
 
@@ -92,9 +95,11 @@ class ClassQuestion:
     def text(self) -> str:
         """The question in words."""
         title = self.item.title.lower()
+        where = f"{'in view, ' if self.in_view else ''}within {self.metres:g} m"
+        if PLURAL.search(HEAD_END.split(title)[0]):
+            return f"Do you see {'more ' if self.more else ''}{title} {where}?"
         article = "another" if self.more else "an" if title[0] in "aeiou" else "a"
-        where = "in view, " if self.in_view else ""
-        return f"Is there {article} {title} {where}within {self.metres:g} m?"
+        return f"Is there {article} {title} {where}?"
 
     def to_dict(self) -> QuestionRecord:
         """Return plain values for JSON."""
@@ -240,7 +245,7 @@ def with_unplaced(
     *,
     absent: Sequence[int] = (),
 ) -> _Locator:
-    """Return a locator with the evidence of undirected and absent objects added to its prior.
+    """Return a locator with the evidence of undirected and absent objects.
 
     InputError if there are any, and the locator is one by distance.
     """
@@ -267,7 +272,7 @@ def with_unplaced(
     }
     return replace(
         locator,
-        log_prior=prior if locator.log_prior is None else locator.log_prior + prior,
+        undirected=prior,
         known={**locator.known, **titles},
         unplaced=tuple(unplaced),
         absent=tuple(absent),

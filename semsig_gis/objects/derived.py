@@ -20,6 +20,7 @@ from semsig_gis.core import (
     angular_distance,
     wrap_degrees,
 )
+from semsig_gis.objects.connected import connected
 from semsig_gis.objects.fronts import street_distances
 from semsig_gis.sources import WGS84, join_areas, transformed
 
@@ -50,8 +51,8 @@ AROUND_RING_M = 15.0
 EDGE_M = 20.0
 # Two ends that point at each other over this distance are those of a tunnel or a passage.
 TUNNEL_M, TUNNEL_DEGREES = 300.0, 25.0
-# Walls of a corner, the least change of direction at it, and the detail that is not a wall.
-WALL_M, CORNER_DEGREES, DETAIL_M = 4.0, 30.0, 0.5
+# Sides of a corner, the least change of direction at it, and the detail that is not a wall.
+SIDE_M, CORNER_DEGREES, DETAIL_M = 4.0, 30.0, 0.5
 # Buildings with smaller gaps between them touch.
 JOINED_M = 0.4
 GAP_M = (1.0, 8.0)
@@ -260,25 +261,6 @@ class _Arm:
         return same_name and near and turn < PARALLEL_DEGREES
 
 
-def _groups(members: Sequence[int], pairs: Iterator[tuple[int, int]]) -> list[list[int]]:
-    """Return the members in groups that the pairs connect, in order."""
-    parent = {member: member for member in members}
-
-    def root(member: int) -> int:
-        while parent[member] != member:
-            parent[member] = parent[parent[member]]
-            member = parent[member]
-        return member
-
-    for first, second in pairs:
-        low, high = sorted((root(first), root(second)))
-        parent[high] = low
-    groups: dict[int, list[int]] = {}
-    for member in members:
-        groups.setdefault(root(member), []).append(member)
-    return list(groups.values())
-
-
 def _junctions(town: _Town) -> _Found:
     """Return the junctions by the number of their arms, and the roundabouts."""
     network = town.network
@@ -290,17 +272,22 @@ def _junctions(town: _Town) -> _Found:
         hits = shapely.STRtree(around).query(points, predicate="intersects")[0]
         in_ring = {crossings[hit] for hit in hits.tolist()}
     crossings = [vertex for vertex in crossings if vertex not in in_ring]
-    vertices = set(crossings)
+    number_of = {vertex: number for number, vertex in enumerate(crossings)}
 
     def links() -> Iterator[tuple[int, int]]:
-        for vertex in crossings:
+        for vertex, number in number_of.items():
             for second in network.neighbours[vertex]:
                 last, metres, _ = network.walk(vertex, second, JUNCTION_M)
-                if last in vertices and metres <= JUNCTION_M:
-                    yield vertex, last
+                if last in number_of and metres <= JUNCTION_M:
+                    yield number, number_of[last]
 
+    clusters: dict[int, list[int]] = {}
+    for vertex, cluster_number in zip(
+        crossings, connected(len(crossings), links()).tolist(), strict=True
+    ):
+        clusters.setdefault(cluster_number, []).append(vertex)
     names, places = [], []
-    for cluster in _groups(crossings, links()):
+    for cluster in clusters.values():
         arms = _arm_count(network, cluster)
         if arms > 2:  # noqa: PLR2004 - else a street that divides
             names.append(ARMS.get(arms, MORE_ARMS))
@@ -319,13 +306,12 @@ def _arm_count(network: _Network, cluster: list[int]) -> int:
             if last not in inside or metres > JUNCTION_M:
                 x, y = network.xy[vertex].tolist()
                 arms.append(_Arm(vertex, (x, y), network.direction(vertex, second), name))
-    numbers = range(len(arms))
     pairs = (
         (first, second)
-        for first, second in itertools.combinations(numbers, 2)
+        for first, second in itertools.combinations(range(len(arms)), 2)
         if arms[first].same_street(arms[second])
     )
-    return len(_groups(numbers, pairs))
+    return len(np.unique(connected(len(arms), pairs)))
 
 
 def _round_rings(network: _Network) -> NDArray[np.object_]:
@@ -373,7 +359,7 @@ def _at_tunnels(network: _Network, ends: list[int], xy: NDArray[np.float64]) -> 
 
 def _building_corners(town: _Town) -> _Found:
     """Return the corners of blocks where two long walls meet outwards."""
-    corner, xy = _corners(town.blocks, WALL_M)
+    corner, xy = _corners(town.blocks, SIDE_M)
     return ["building_corner"] * len(corner), xy
 
 

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import shapely
 
+from semsig_gis.objects.connected import connected
+
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -50,7 +52,7 @@ def thing_points(
     parts, whole = shapely.get_parts(parts, return_index=True)  # the rings of an area with holes
     row = row[whole]
     part, xy = _along(parts)
-    group = _joined(
+    group = connected(
         len(codes),
         itertools.chain(_same_keys(codes, keys), _continued(parts, row, codes, names, joins)),
     )
@@ -103,19 +105,3 @@ def _continued(
     for (_, name, _, _), (first, *others) in ends_of.items():
         if name or len(others) == 1:
             yield from ((first, other) for other in others)
-
-
-def _joined(size: int, pairs: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
-    """Return the first row of the thing that each row belongs to, by pairs of the same thing."""
-    group = list(range(size))
-
-    def root(row: int) -> int:
-        while group[row] != row:
-            group[row] = group[group[row]]
-            row = group[row]
-        return row
-
-    for first, second in pairs:
-        low, high = sorted((root(first), root(second)))
-        group[high] = low
-    return np.array([root(row) for row in range(size)], np.int64)

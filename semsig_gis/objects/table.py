@@ -36,6 +36,7 @@ from semsig_gis.core import (
     map_with,
     plot_with,
 )
+from semsig_gis.sources import as_text
 from semsig_gis.storage import (
     BBOX,
     COVERING,
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import geopandas as gpd
+    import pandas as pd
     from numpy.typing import NDArray
     from pyproj import CRS
 
@@ -177,7 +179,7 @@ class StreetObjects(Displayed):
         columns = {
             name: pa.array(self.table[name].to_numpy(kind))
             if name in NUMBERS
-            else pa.array(self.table[name].tolist(), pa.string())
+            else pa.array(_as_texts(self.table[name]), pa.string())
             for name, kind in COLUMNS.items()
             if name in self.table
         }
@@ -271,6 +273,13 @@ def arrow_objects(arrow: pa.Table, *, xy: NDArray[np.float64], **attributes: Any
     objects = _ArrowObjects.__new__(_ArrowObjects)
     vars(objects).update(attributes, arrow=arrow, codes=codes, xy=xy)
     return objects
+
+
+def _as_texts(column: pd.Series) -> list[str]:
+    """Return the texts of a column; what is missing is empty."""
+    return [
+        as_text(value) if there else "" for value, there in zip(column, column.notna(), strict=True)
+    ]
 
 
 def without_empty(arrow: pa.Table) -> pa.Table:

@@ -497,7 +497,7 @@ class Workbench:
                 scores.append([])
                 for number, (name, view) in enumerate(zip(names, views, strict=True)):
                     # Hints are about the first place only.
-                    view_hints, prior = ((), None) if number else (hints, locator.log_prior)
+                    view_hints, prior = ((), None) if number else (hints, locator.log_weights)
                     scanned = self._scores.get(name) or locator.scan(view)
                     score_key = json.dumps([name, view_hints, locator.quick])
                     best = self._scores.get(score_key)

@@ -101,6 +101,7 @@ from .rows import FilteredRows as FilteredRows
 from .rows import RowRules as RowRules
 from .rows import Rows as Rows
 from .rows import fits_the_globe as fits_the_globe
+from .rows import heights_in as heights_in
 from .rows import off_the_globe as off_the_globe
 from .rows import parse_crs as parse_crs
 from .rows import raw_layer as raw_layer

@@ -592,8 +592,7 @@ class RowRules:
         if own is not None and own in columns:
             stated = columns[own].map(_metres, float)
             heights = np.where(np.isnan(stated), heights, stated)
-        plausible = (heights > 0) & (heights <= MAX_HEIGHT_M)
-        return np.where(plausible, heights, math.nan).astype(np.float32)
+        return _plausible(heights).astype(np.float32)
 
 
 def _texts(columns: Mapping[str, _CodedColumn], field: str | None, size: int) -> pa.Array:
@@ -641,6 +640,35 @@ def _metres(value: object) -> float:
         return decimal(as_text(value).strip().removesuffix("m"))
     except ValueError:
         return math.nan
+
+
+def heights_in(values: Iterable[object]) -> NDArray[np.float64]:
+    """Return the heights in metres that some values state.
+
+    Parameters
+    ----------
+    values : iterable of object
+        Numbers, or texts such as ``12 m``.
+
+    Returns
+    -------
+    ndarray of float64
+        The heights, NaN for all that is not a plausible height.
+
+    Examples
+    --------
+    >>> heights_in([12, "12,5 m", "three storeys", None, -1]).tolist()
+    [12.0, 12.5, nan, nan, nan]
+    """
+    array = np.asarray(values if isinstance(values, np.ndarray) else list(values))
+    if array.dtype.kind not in "fiu":
+        array = np.array([_metres(value) for value in values])
+    return _plausible(array.astype(np.float64))
+
+
+def _plausible(heights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return heights with NaN for what cannot be one."""
+    return np.where((heights > 0) & (heights <= MAX_HEIGHT_M), heights, math.nan)
 
 
 def require_field(field: str, fields: Sequence[str], *, where: str, key: str) -> None:

@@ -168,6 +168,19 @@ def test_a_landmark_in_its_own_building_is_seen_and_a_near_roof_hides_it() -> No
     assert view.lengths.tolist() == [1, 1, 1]
 
 
+def test_heights_of_buildings_may_be_text() -> None:
+    tower = town((105.0, 5.0, 232, -1, 20.0), (0.0, 0.0, 3, -1, np.nan))
+    values: list[object] = ["12 m", "", "three storeys", None, np.inf, -3.0, 0, "9,5", 7]
+    heights = [12.0, *[np.nan] * 6, 9.5, 7.0]
+    rows = buildings([(10.0 * number, 0.0, 0.0) for number in range(len(values))])
+    assert rows is not None
+    texts, numbers = rows.assign(height=values), rows.assign(height=heights)
+    assert_equal(*(build_database(tower, grid=GRID, footprints=part) for part in (texts, numbers)))
+    stored = ObjectStore.of(tower, footprints=texts).footprints
+    assert stored is not None
+    np.testing.assert_array_equal(stored[HEIGHT], heights)
+
+
 def assert_equal(first: SignatureDatabase, second: SignatureDatabase) -> None:
     assert_same(first, second)
     values = [part.extents for part in (first, second)]

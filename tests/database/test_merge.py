@@ -11,7 +11,7 @@ import shapely
 from sentences import refused
 from worlds import CODES, CORNER, TAXONOMY, assert_same, objects_of, surroundings
 
-from semsig_gis.core import DatabaseError, GridSpec, SignatureSpec
+from semsig_gis.core import DatabaseError, GridSpec, SignatureSpec, Taxonomy
 from semsig_gis.database import (
     ObjectStore,
     TileSpec,
@@ -147,11 +147,18 @@ def test_databases_with_different_settings_are_not_merged(
     out = tmp_path / "region.parquet"
     others = dataclasses.replace(objects, table=objects.table.to_crs("EPSG:32631"))
     other_classes = dataclasses.replace(objects, taxonomy=TAXONOMY)
+    few_classes = dataclasses.replace(objects, taxonomy=Taxonomy(CLASSES.classes[:-5]))
     for words, part, mode, specs in (
         ("grid", objects, "all", {"grid": GridSpec(7.0)}),
         ("range or angle levels", objects, "all", {"spec": SignatureSpec(20.0)}),
         ("viewpoints", objects, "outdoor", {}),
-        ("classes", other_classes, "all", {}),
+        (
+            "classes (18 and 18; not the same in both: alignment_tree, water_fountain)",
+            other_classes,
+            "all",
+            {},
+        ),
+        ("classes (18 and 13; only the first has ", few_classes, "all", {}),
     ):
         east = city(part, tmp_path / "east.parquet", mode, 200, 400, **specs)  # type: ignore[arg-type]
         with refused(DatabaseError, f"differ in their {words}", "build both in the same way"):

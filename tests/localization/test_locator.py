@@ -101,6 +101,15 @@ def test_absent_and_undirected_objects_are_used() -> None:
     assert prior is not None
     assert prior["seen"] == ["bus stop"]
     assert len(prior["absent"]) == 1
+    assert "ratio" not in prior
+    # They belong to the view: only a prior that was given can contradict it.
+    flat = np.zeros(len(CITY))
+    both = localize(CITY, f"{SENTENCE}, bus stop, no fountain", log_prior=flat)
+    assert both.prior_ratio == pytest.approx(1.0)
+    assert (
+        both.to_dict()["candidates"]
+        == localize(CITY, f"{SENTENCE}, bus stop, no fountain").to_dict()["candidates"]
+    )
     with refused(InputError, "edit", "directions"):
         localize(CITY, f"{SENTENCE}, bus stop", method=PAPER_METHOD)
 

@@ -24,6 +24,7 @@ from semsig_gis.core import CrsError, DatabaseError, EmptyResultError, UnknownNa
 from semsig_gis.objects import (
     LayerReport,
     Licence,
+    StreetObjects,
     build_objects,
     objects_specs,
     open_objects,
@@ -35,7 +36,6 @@ from semsig_gis.storage import geo_metadata, write_geoparquet
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.objects import StreetObjects
     from semsig_gis.sources import RawLayer
 
 LAMBERT = "EPSG:2154"
@@ -64,6 +64,17 @@ def test_geodataframe_has_names_and_symbols_of_classes() -> None:
     assert table.crs == objects.crs
     assert table.attrs["licenses"] == [str(licence) for licence in objects.licenses]
     assert "symbol" not in objects.table
+
+
+def test_texts_that_are_missing_are_empty() -> None:
+    objects = build(raw_layer(points((0, 0), (50, 0), (90, 0)), classes=["bench"] * 3))
+    table = objects.table.assign(name=["Old bench", None, NAN], house_number=[NAN, 7, 7.5])
+    objects = StreetObjects(table, objects.taxonomy, objects.licenses)
+    assert objects.texts is not None
+    assert objects.texts.to_pydict() == {
+        "name": ["Old bench", "", ""],
+        "house_number": ["", "7", "7.5"],
+    }
 
 
 ABSENT = object()

@@ -20,9 +20,9 @@ from pyproj import Transformer
 from sentences import assert_sentence
 from workbench import coco, decompression_bomb, picture
 
-from semsig_gis.core import SemsigError
+from semsig_gis.core import ObjectClass, SemsigError
 from semsig_gis.database import visible_objects_at
-from semsig_gis.localization import NOISES
+from semsig_gis.localization import NOISES, ClassQuestion
 from semsig_gis.observation import Camera
 from semsig_gis.serve import Question, Workbench, city_streets
 from semsig_gis.sources import paper_taxonomy
@@ -435,6 +435,25 @@ def test_yolo_boxes_use_the_list_of_labels(page: Page) -> None:
     assert (mark["class"], mark["score"]) == ("bench", 0.8)
     reply = page.ask("/api/boxes", {**body, "classes": "dog\n"})
     assert (reply["photos"]["a.jpg"], len(reply["notes"])) == ([], 2)
+
+
+@pytest.mark.parametrize(
+    ("title", "more", "text"),
+    [
+        ("Steps", False, "Do you see steps within 30 m?"),
+        ("Toilets", True, "Do you see more toilets within 30 m?"),
+        ("Row of bollards", False, "Is there a row of bollards within 30 m?"),
+        ("Gap between buildings", True, "Is there another gap between buildings within 30 m?"),
+        ("Arches, large or small", False, "Do you see arches, large or small within 30 m?"),
+        ("Underpass", False, "Is there an underpass within 30 m?"),
+    ],
+)
+def test_questions_about_several_things_are_in_the_plural(
+    title: str, text: str, *, more: bool
+) -> None:
+    item = ObjectClass(224, "z", "thing", title)
+    question = ClassQuestion(item=item, metres=30, more=more, in_view=False, chance=0.5, gain=1.0)
+    assert question.text == text
 
 
 def test_suggestions_are_questions_by_gain(page: Page) -> None:

@@ -362,14 +362,14 @@ class Location(Answer):
         ``texts``, if something was read, has for each ``text`` the best ``fit`` ("exact", "part",
         "letters off" or "none"), its ``kind`` ("object" or "street"), some of the ``names`` that
         fit so and the ``count`` of all that do.
-        ``prior`` has the keys of `known` and ``ratio``; it is None without a prior.
+        ``prior`` has the keys of `known` and, with a prior, ``ratio``; it is None without any.
         """
         lat, lon = self.latlon
         candidates = self.candidate_rows()
         for candidate, why in zip(candidates, self.explanations, strict=False):
             candidate["explanation"] = why.to_dict(self.north)
         threshold, ratio = self.rule.threshold, self.prior_ratio
-        prior: Any = None if ratio is None else {**self.known, "ratio": ratio}
+        prior: Any = dict(self.known) if ratio is None else {**self.known, "ratio": ratio}
         values: LocationRecord = {
             "query": self.query.to_dict(self.taxonomy),
             "north": self.north.to_dict(),
@@ -399,7 +399,7 @@ class Location(Answer):
                 "text": self.region_text,
             },
             "entropy_bits": self.posterior.entropy,
-            "prior": prior,
+            "prior": prior or None,
             "notes": list(self.notes),
             "crs": self.crs.to_string(),
             "licenses": list(self.licenses),
@@ -417,6 +417,7 @@ class LikelihoodLocator:
     If `refined` is None, a place is refined if there are a store and bearings. A `quick` answer
     scores cells only at their centres, re-ranks fewer of them, and has no heading of the place. An
     `incremental` index, which wraps `index`, is for a view that grows from query to query.
+    `undirected` is what the `unplaced` and `absent` objects of the first view say, by cell.
     """
 
     index: LikelihoodIndex
@@ -435,6 +436,7 @@ class LikelihoodLocator:
     city: City | ObjectStore | None = None
     unplaced: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
+    undirected: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -442,6 +444,13 @@ class LikelihoodLocator:
             raise InputError(
                 "searching between the viewpoints needs the object store of the database; give it."
             )
+
+    @property
+    def log_weights(self) -> NDArray[np.float64] | None:
+        """Logarithms by cell, of the prior and of what was seen without a direction."""
+        if self.log_prior is None or self.undirected is None:
+            return self.undirected if self.log_prior is None else self.log_prior
+        return self.log_prior + self.undirected
 
     def locate(self, query: Signature, *, top: int | None = None) -> Location:
         """Locate a query."""
@@ -470,7 +479,7 @@ class LikelihoodLocator:
         log-likelihood of each view, for densities that are not per degree. The `scores` of the
         views, and the results `scanned` of `scan` for the first, are computed if not given.
         """
-        database, log_prior = self.index.database, self.log_prior
+        database, log_prior = self.index.database, self.log_weights
         scored = [self._route_scores(queries) for queries in versions] if scores is None else scores
         chances = [
             route_posteriors(database, [view.loglik for view in views], legs, log_prior=log_prior)
@@ -484,7 +493,7 @@ class LikelihoodLocator:
                 )
         shares = np.exp(evidence - np.logaddexp.reduce(evidence))
         best, ratio = int(shares.argmax()), None
-        if log_prior is not None:
+        if self.log_prior is not None:
             first = self.scores(
                 versions[best][0], scanned=scanned[best] if scanned else None
             ).loglik
@@ -492,7 +501,9 @@ class LikelihoodLocator:
                 logliks = [first, *(view.loglik for view in scored[best][1:])]
                 start = route_posteriors(database, logliks, legs)[0].chances
                 first = np.log(np.maximum(start, TINY))
-            ratio = prior_ratio(first, log_prior)
+            # Objects without a direction belong to the view, not to the prior.
+            view = first if self.undirected is None else first + self.undirected
+            ratio = prior_ratio(view, self.log_prior)
         elsewhere = 0.0
         if not self.surely_here:
             ratios = [
@@ -520,7 +531,7 @@ class LikelihoodLocator:
 
     def _route_scores(self, queries: Sequence[Signature]) -> list[CellScores]:
         """Return the scores of the views of a route; the prior is that of the first."""
-        first = [self.scores(query, self.log_prior) for query in queries[:1]]
+        first = [self.scores(query, self.log_weights) for query in queries[:1]]
         return first + [self.scores(query) for query in queries[1:]]
 
     def rankings(

@@ -53,7 +53,7 @@ class PriorRecord(TypedDict):
     require: NotRequired[KnownCells]
     seen: NotRequired[list[str]]
     absent: NotRequired[list[str]]
-    ratio: float
+    ratio: NotRequired[float]
 
 
 class LikelyRecord(CandidateRecord):
