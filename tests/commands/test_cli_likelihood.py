@@ -75,7 +75,7 @@ def test_what_was_read_is_compared_with_the_map(tmp_path: Path, run: Run) -> Non
     assert [fit for fit, _ in fits[2]] == ["letters off", "part"]
     assert any("'Nowhere'" in note for note in answers[0]["notes"])
     code, out, _ = run("localize", city, lines[0]["see"], "--explain")
-    assert "'kiosk cccaaa' is Kiosk cccaaa." in out
+    assert "'kiosk cccaaa' is written on 1 object of the map." in out
     assert "that reads 'kiosk cccaaa'" in out
 
 

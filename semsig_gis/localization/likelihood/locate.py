@@ -605,8 +605,14 @@ class LikelihoodLocator:
         *,
         scanned: CellScores | None = None,
     ) -> CellScores:
-        """Return the scores of all cells; those of the best are by one-to-one associations."""
+        """Return the scores of all cells; those of the best are by one-to-one associations.
+
+        A view of nothing but signs says only what they say: who reads a sign looks for no objects.
+        """
         reading = self._reading(query)
+        if reading.extra is not None and not len(reading.view):
+            headings = (None,) * len(View.of(reading.view).photos)
+            return CellScores(loglik=reading.extra, headings=headings)
         if reading.extra is not None:
             log_prior = reading.extra if log_prior is None else log_prior + reading.extra
         scores = rerank(

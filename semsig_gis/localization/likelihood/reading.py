@@ -1,11 +1,12 @@
 """What was read, as evidence of the place: on objects, and on signs in an unknown direction.
 
 A text s that was read on an object fits the texts of the map at a level: exactly, as a part, or a
-few letters off. If the detection is an object of class c with texts that fit at level l, the text
-is ``SHARES[l] / b`` times as likely as anywhere, where b is the share of the texts of class c that
-fit at this level; if they do not fit, it is ``MISREAD`` times as likely, divided by their share.
-The factor of an object that fits is 1 or more, and of others 1 or less. Objects without a text,
-and false objects, are as likely as anywhere. So a common text says little.
+few letters off. If the detection is an object with texts that fit at level l, the text is
+``SHARES[l] / b`` times as likely as anywhere, where b is the share of the texts that fit at this
+level or better, among those of the classes that the detection may be; if they do not fit, it is
+``MISREAD`` times as likely, divided by their share. The factor of an object that fits is 1 or more,
+and of others 1 or less. Objects without a text, and false objects, are as likely as anywhere. So a
+common text says little, and a false object with a rare text is as rare as the text.
 
 Objects that fit are parts of their class for the one question: they get free class codes in a copy
 of the database and of the street objects (`DividedTaxonomy`), and the scores of a detection are
@@ -212,9 +213,10 @@ def map_texts(store: ObjectStore) -> MapTexts:
 class DividedIndex:
     """An index and a store with classes divided by the fit of some texts.
 
-    By text, `factors` of the parts, shape (t, parts), and of the rest of each class, by its code,
-    shape (t, 256), are how much likelier the text is than anywhere. `weights` are those of the
-    classes of a detection with a text.
+    By text, `often`, shape (t, 256, levels), is how often it fits the texts of each class, by its
+    code. `levels` of the parts, shape (t, parts), say how well it fits, and `shares`, shape
+    (t, 256, levels), what share of the rest of each class has texts that fit at each level.
+    `weights` are those of the classes of a detection with a text.
     """
 
     plain: LikelihoodIndex
@@ -222,8 +224,9 @@ class DividedIndex:
     store: ObjectStore
     taxonomy: DividedTaxonomy
     texts: tuple[str, ...]
-    factors: NDArray[np.float64]
-    rest: NDArray[np.float64]
+    often: NDArray[np.float64]
+    levels: NDArray[np.uint8]
+    shares: NDArray[np.float64]
     weights: NDArray[np.float64]
 
     @classmethod
@@ -234,10 +237,12 @@ class DividedIndex:
         objects, names = store.objects, map_texts(store).objects
         database, codes = index.database, objects.codes
         fits = np.stack([*levels.values()])
-        by_level = _factors(fits, codes, names.present)
-        factor = by_level[np.arange(len(fits))[:, None], codes, fits]
-        factor[:, ~names.present] = 1.0
-        parts, part_of = _parts(fits, factor, codes, index.table.codes)
+        often = _often(fits, codes, names.present)
+        rarest = often[:, index.table.codes].min(axis=1)
+        most = np.stack(
+            [_factors(own)[own_fits] for own, own_fits in zip(rarest, fits, strict=True)]
+        )
+        parts, part_of = _parts(fits, most, codes, index.table.codes)
         free = _free_codes(database.taxonomy, database.present_codes, codes)
         parts = parts[: len(free) - 1]
         own = np.flatnonzero(np.isin(part_of, parts))
@@ -252,16 +257,20 @@ class DividedIndex:
         left = np.ones(len(codes), np.bool_)
         left[own] = False
         counts = np.bincount(codes, minlength=256)
-        others = np.bincount(codes[left], minlength=256)
-        sums = [np.bincount(codes[left], row[left], 256) for row in factor]
+        others = np.maximum(np.bincount(codes[left], minlength=256), 1)
+        left &= names.present
+        shares = np.zeros(often.shape)
+        for row, own_fits in enumerate(fits):
+            np.add.at(shares[row], (codes[left], own_fits[left]), 1.0)
         return cls(
             plain=index,
             index=_recoded_index(index, objects, own, new, taxonomy),
             store=_recoded_store(store, new, taxonomy),
             taxonomy=taxonomy,
             texts=tuple(levels),
-            factors=factor[:, first],
-            rest=np.where(others > 0, np.minimum(sums / np.maximum(others, 1), 1.0), 1.0),
+            often=often,
+            levels=fits[:, first],
+            shares=shares / others[:, None],
             weights=np.maximum(
                 np.bincount(codes[names.present], minlength=256) / np.maximum(counts, 1), UNNAMED
             ),
@@ -276,15 +285,20 @@ class DividedIndex:
         plain = name_scores(view, table)
         wrong = table.misnamed.mean(axis=0)
         parents = [int(table.row_of[code]) for code in self.taxonomy.parents.values()]
-        scores = np.zeros((len(view), len(self.rest[0])))
+        scores = np.zeros((len(view), 256))
         for number, text in enumerate(view.text_rows):
             own = plain[:, number]
             rest, factors = np.ones(len(own)), np.ones(len(parents))
             if text in self.texts:
                 row = self.texts.index(text)
-                rest, factors = self.rest[row, table.codes], self.factors[row]
                 if np.count_nonzero(own) > 1:
                     own = own * self.weights[table.codes]
+                chances = own * table.clutter / (table.clutter @ own)
+                by_level = _factors(chances @ self.often[row, table.codes])
+                factors = by_level[self.levels[row]]
+                # Objects of the rest without a text are as likely as anywhere.
+                rest = 1.0 + self.shares[row, table.codes] @ (by_level - 1.0)
+                rest = np.minimum(rest, 1.0)
             left = own * rest
             # An object of a part that is misnamed as well has the factor of its part.
             more = factors * (table.others @ own)[parents] - (table.others @ left)[parents]
@@ -301,21 +315,33 @@ class DividedIndex:
         return divided, float(np.log(sums).sum() * power)
 
 
-def _factors(
+def _often(
     fits: NDArray[np.uint8], codes: NDArray[np.uint8], has_text: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Return how much likelier each text is on an object, by text, class code and level."""
+    """Return the share of the texts of each class that a text fits, by text, code and level.
+
+    It fits them at the level or better; the share of level `NONE` is that of texts that do not fit.
+    """
     sizes = np.bincount(codes[has_text], minlength=256)
-    factors = np.ones((len(fits), 256, EXACT + 1))
+    often = np.zeros((len(fits), 256, EXACT + 1))
     for text, own in enumerate(fits):
-        rest = np.ones(256)
-        for level, share in SHARES.items():
-            counts = np.bincount(codes[own == level], minlength=256)
+        for level in SHARES:
+            counts = np.bincount(codes[own >= level], minlength=256)
             usual = (counts.sum() + 0.5) / (has_text.sum() + 1.0)
-            often = (counts + USUAL_TEXTS * usual) / (sizes + USUAL_TEXTS)
-            factors[text, :, level] = np.maximum(share / often, 1.0)
-            rest -= often
-        factors[text, :, NONE] = np.minimum(MISREAD / np.maximum(rest, MISREAD), 1.0)
+            often[text, :, level] = (counts + USUAL_TEXTS * usual) / (sizes + USUAL_TEXTS)
+    often[:, :, NONE] = 1.0 - often[:, :, LETTERS_OFF]
+    return often
+
+
+def _factors(often: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how much likelier a text is than anywhere on an object, by how well it fits.
+
+    `often` is that of `_often` for the classes that the object may be.
+    """
+    factors = np.empty(EXACT + 1)
+    for level, share in SHARES.items():
+        factors[level] = max(share / often[level], 1.0)
+    factors[NONE] = min(MISREAD / max(often[NONE], MISREAD), 1.0)
     return factors
 
 
@@ -576,7 +602,9 @@ class _Reader:
             np.maximum.at(levels, cells, self.objects[text].levels[owners])
         counts = np.bincount(levels, minlength=EXACT + 1)
         factors = np.array([0.0, *(SHARES[level] for level in range(1, EXACT + 1))])
-        factors *= (size + 1.0) / (counts + 1.0)
+        # Whoever reads the name of one street hardly misread that of another, so that a name
+        # that fits is compared with all that fit as well or better.
+        factors *= (size + 1.0) / (np.cumsum(counts[::-1])[::-1] + 1.0)
         factors[NONE] = min(MISREAD / max(counts[NONE] / size, MISREAD), 1.0)
         return np.asarray(np.log(factors)[levels])
 

@@ -230,18 +230,20 @@ def query_sentences(answer: Answer) -> Iterator[str]:
             yield f"{label}: {', '.join(titles).lower()}."
 
 
-FITS = {"exact": "is", "part": "fits", "letters off": "is nearly"}
-
-
 def _fit_sentences(location: Location) -> Iterator[str]:
     """Yield the names of the map that each text fits."""
     for record in location.texts:
         if names := record["names"]:
-            thing = "street" if record["kind"] == "street" else "object"
-            rest = record["count"] - len(names)
-            more = f" and {rest:,} more {thing}s" if thing == "object" and rest > 0 else ""
-            street = "the street " if thing == "street" else ""
-            yield f"{record['text']!r} {FITS[record['fit']]} {street}{' or '.join(names)}{more}."
+            count, street = record["count"], record["kind"] == "street"
+            objects = "1 object" if count == 1 else f"{count:,} objects"
+            if record["fit"] == "exact":
+                place = "the name of a street" if street else f"written on {objects} of the map"
+                yield f"{record['text']!r} is {place}."
+                continue
+            fit = "fits" if record["fit"] == "part" else "is nearly"
+            place = "the name of a street" if street else f"on {objects}"
+            verb = "is" if len(names) == 1 or street else "are"
+            yield f"{record['text']!r} {fit} {' or '.join(map(repr, names))}, which {verb} {place}."
 
 
 def tie_sentences(answer: Localization) -> Iterator[str]:
