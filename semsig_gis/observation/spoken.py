@@ -353,7 +353,7 @@ def _items(
             if first and size == 1 and plain and text in symbols:
                 item = _Item("symbol", symbols[text], text)
         yield item
-        place += size + _is_possessive(item, tokens[place + size : place + size + 1])
+        place += size + _is_possessive(tokens[place + size : place + size + 1])
         if item.value == HOUSE_NUMBER and (
             house := _HOUSE.match(token.string, tokens[place - 1].end())
         ):
@@ -364,9 +364,9 @@ def _items(
         first = item.kind in SEPARATORS or (first and item.kind in {"skip", "number", "none"})
 
 
-def _is_possessive(item: _Item, following: Sequence[re.Match[str]]) -> bool:
-    """Return whether the s of a possessive follows, such as that of "baker's"."""
-    return item.kind in {"thing", "other"} and any(
+def _is_possessive(following: Sequence[re.Match[str]]) -> bool:
+    """Return whether the s of a possessive follows, such as that of "baker's", or of "it's"."""
+    return any(
         token.group() == "s" and token.string[token.start() - 1] in "'\u2019" for token in following
     )
 
