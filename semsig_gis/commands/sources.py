@@ -149,7 +149,11 @@ def _about(catalog: Catalog) -> Iterator[str]:
         f"{catalog.title}: {len(catalog.layers)} layers; place: "
         f"{catalog.place or 'not stated'}; needs {_needs_text(catalog)}."
     )
-    titles = {item.code: item.title.lower() for item in catalog.classes}
+    usual = {name for spec in catalog.layers if not spec.optional for name in spec.classes}
+    titles = {
+        item.code: item.title.lower() + ("" if item.name in usual else " (optional)")
+        for item in catalog.classes
+    }
     for family, codes in codes_by_family(catalog.taxonomy, titles).items():
         heading = family_named(family).title if family else "Classes"
         yield f"{heading}: {', '.join(titles[code] for code in codes)}."

@@ -26,8 +26,8 @@ from semsig_gis.database import SurveyRecord
 class SurveyPlace:
     """Say what the data of a place can carry, before you build.
 
-    At places every 10 m along the streets, the objects in sight are counted, those of optional
-    layers as well. Where few are seen, a view fits many places.
+    At places every 10 m along the streets, the objects in sight are counted, and then what optional
+    layers add. Where few are seen, a view fits many places.
     """
 
     files: Annotated[
@@ -69,15 +69,19 @@ class SurveyPlace:
         from semsig_gis.database import survey
         from semsig_gis.objects import load, read_area
         from semsig_gis.output import survey_sentence, survey_tables
+        from semsig_gis.sources import combine_catalogs, detect_catalogs, load_catalog
 
+        names, remarks = (self.catalog, ()) if self.catalog else detect_catalogs(self.files)
+        for line in remarks:
+            reporter.remark(line)
+        catalog = combine_catalogs(list(map(load_catalog, names)))
         with reporter.progress("loading") as advance:
             loaded = load(
                 self.files,
-                catalog=self.catalog or (),
+                catalog=catalog,
                 selection="all",
                 crs=self.crs,
                 progress=advance,
-                remark=reporter.remark,
             )
         area = None
         if self.area is not None:
@@ -85,7 +89,10 @@ class SurveyPlace:
             near = (*xy.min(axis=0).tolist(), *xy.max(axis=0).tolist())
             area = read_area(self.area, crs=loaded.objects.crs, near=near)
         with reporter.progress("looking around") as advance:
-            result = survey(loaded, radius=self.radius, area=area, progress=advance)
+            optional = [spec.name for spec in catalog.layers if spec.optional]
+            result = survey(
+                loaded, optional=optional, radius=self.radius, area=area, progress=advance
+            )
         first, *others = survey_tables(result)
         return Result(
             values=result.to_dict,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,13 +10,13 @@ import lazy_loader
 import numpy as np
 from typing_extensions import TypedDict
 
-from semsig_gis.core import FAMILIES, EmptyResultError, GridSpec, ObjectIndex, consecutive
+from semsig_gis.core import FAMILIES, SOURCE, EmptyResultError, GridSpec, ObjectIndex, consecutive
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.sightings import visible_objects_at
 from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints, reproject
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Collection, Iterable
 
     import shapely
     from numpy.typing import NDArray
@@ -41,6 +42,7 @@ class FamilyRecord(TypedDict):
     """A family in a survey; `FamilySurvey` describes the fields."""
 
     family: str
+    optional: bool
     classes: int
     objects: int
     per_km: float | None
@@ -67,6 +69,7 @@ class FamilySurvey:
     `classes` and `objects` are their numbers on the map, `per_km` the objects for each kilometre of
     street, None without streets. `added` are the shares of the places by the number of objects
     that they see of this family and of those before it, `own` of this family only (see `SEEN`).
+    With `optional`, they are the objects of optional layers.
     """
 
     family: str
@@ -75,6 +78,7 @@ class FamilySurvey:
     per_km: float | None
     added: tuple[float, ...]
     own: tuple[float, ...]
+    optional: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +87,8 @@ class Survey:
 
     `places` is the number of places that were looked at, every 10 m along `street_km` of streets,
     or outdoors if there are no streets. With `occlusion`, buildings hide what is behind them. The
-    first of `families` is street furniture, also if there is none.
+    first of `families` is street furniture, also if there is none; those of optional layers are
+    the last.
     """
 
     places: int
@@ -95,13 +100,13 @@ class Survey:
 
     @property
     def objects(self) -> int:
-        """The number of objects in the area."""
-        return sum(item.objects for item in self.families)
+        """The number of objects in the area, without optional layers."""
+        return sum(item.objects for item in self.families if not item.optional)
 
     @property
     def seen(self) -> tuple[float, ...]:
-        """The shares of the places by the number of objects of all families that they see."""
-        return self.families[-1].added
+        """The shares of the places by the number of objects that they see, as `objects`."""
+        return next(item for item in reversed(self.families) if not item.optional).added
 
     def to_dict(self) -> SurveyRecord:
         """Return the survey as plain values for JSON."""
@@ -127,6 +132,7 @@ def _record(shares: Iterable[float]) -> dict[str, float]:
 def survey(
     loaded: Loaded,
     *,
+    optional: Collection[str] = (),
     radius: float = 30.0,
     area: shapely.Polygon | shapely.MultiPolygon | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -137,6 +143,8 @@ def survey(
     ----------
     loaded : Loaded
         The street objects, with buildings and streets if there are any.
+    optional : collection of str
+        Names of the layers that are counted after all others.
     radius : float, default 30
         Visibility range in metres of classes without their own.
     area : shapely.Polygon or shapely.MultiPolygon, optional
@@ -179,14 +187,14 @@ def survey(
         raise EmptyResultError(
             "there is no place outside the buildings here; check the area and the buildings."
         )
-    names, family_of = _families(objects)
+    names, family_of = _families(objects, optional)
     counts = np.zeros((len(places), len(names)), np.int64)
     index = ObjectIndex(objects.xy)
     for start in range(0, len(places), PLACES_PER_BLOCK):
         block = places[start : start + PLACES_PER_BLOCK]
         views = visible_objects_at(objects, block, index=index, radius=radius, footprints=buildings)
         place = start + np.repeat(np.arange(len(block)), views.lengths)
-        np.add.at(counts, (place, family_of[views.codes]), 1)
+        np.add.at(counts, (place, family_of[views.objects]), 1)
         if progress is not None:
             progress(start + len(block), len(places))
     km = float(shapely.length(streets).sum()) / 1e3
@@ -194,12 +202,13 @@ def survey(
     if area is not None:
         inside = shapely.intersects_xy(area, objects.xy[:, 0], objects.xy[:, 1])
     families = []
-    for number, name in enumerate(names):
-        rows = np.flatnonzero(inside & (family_of[objects.codes] == number))
+    for number, (extra, name) in enumerate(names):
+        rows = np.flatnonzero(inside & (family_of == number))
         things = _things(objects, rows)
         families.append(
             FamilySurvey(
                 family=name,
+                optional=extra,
                 classes=len(np.unique(objects.codes[rows])),
                 objects=things,
                 per_km=things / km if along_streets else None,
@@ -266,16 +275,21 @@ def _outdoors(
     return grid.viewpoints(columns[mask], rows[mask])
 
 
-def _families(objects: StreetObjects) -> tuple[list[str], NDArray[np.int64]]:
-    """Return the families on the map, furniture first, and the number of that of each code."""
-    present = list(objects.class_counts)
-    family_of = {item.code: item.family or BASE for item in objects.taxonomy.classes}
-    others = dict.fromkeys(family_of[code] for code in present)
-    names = list(dict.fromkeys([BASE, *(name for name in FAMILIES if name in others), *others]))
-    numbers = np.full(256, -1)
-    for code in present:
-        numbers[code] = names.index(family_of[code])
-    return names, numbers
+def _families(
+    objects: StreetObjects, optional: Collection[str]
+) -> tuple[list[tuple[bool, str]], NDArray[np.int64]]:
+    """Return the families on the map, furniture first, and the number of that of each object.
+
+    Those of optional layers are others, after the first ones.
+    """
+    titles = {item.code: item.family or BASE for item in objects.taxonomy.classes}
+    extra = objects.table[SOURCE].isin(list(optional)).tolist()
+    keys = list(zip(extra, (titles[code] for code in objects.codes.tolist()), strict=True))
+    order = dict.fromkeys((BASE, *FAMILIES, *titles.values()))
+    present = {(False, BASE), *keys}
+    names = [key for key in itertools.product((False, True), order) if key in present]
+    numbers = {key: number for number, key in enumerate(names)}
+    return names, np.array([numbers[key] for key in keys], np.int64)
 
 
 def _things(objects: StreetObjects, rows: NDArray[np.int64]) -> int:

@@ -33,6 +33,8 @@ def at(x: float, y: float) -> tuple[float, float]:
     return 700_000.0 + x, 6_600_000.0 + y
 
 
+# Position along the street, class code and layer.
+OPTIONAL = [(0, 1, "a"), (10, 200, "a"), (20, 1, "huts"), (40, 200, "huts"), (90, 200, "huts")]
 STREET = shapely.LineString([at(0, 0), at(95, 0)])
 LANE = shapely.MultiLineString([[at(0, 40), at(3, 40)], [at(0, 0), at(0, 40)]])
 WALL = shapely.box(*at(20, 2), *at(60, 6))
@@ -118,6 +120,32 @@ def test_the_points_of_an_extended_thing_are_one_object() -> None:
     objects = objects_of(*points, licenses=(), taxonomy=CLASSES, group=[0, 0, 0, 7, 7, -1])
     (furniture,) = survey(loaded(objects, surroundings(STREET))).families
     assert furniture.objects == 3
+
+
+def test_optional_layers_come_last() -> None:
+    things = [(*at(x, 0), code, layer, str(x)) for x, code, layer in OPTIONAL]
+    objects = objects_of(*things, licenses=(), taxonomy=CLASSES)
+    town = loaded(objects, surroundings(STREET))
+    result = survey(town, optional=["huts", "nothing"])
+    rows = [(item.family, item.optional, item.objects) for item in result.families]
+    assert rows == [
+        ("furniture", False, 1),
+        ("shop", False, 1),
+        ("furniture", True, 1),
+        ("shop", True, 2),
+    ]
+    places = [row for row, (_, _, layer) in enumerate(OPTIONAL) if layer != "huts"]
+    plain = survey(
+        loaded(
+            objects_of(*(things[row] for row in places), licenses=(), taxonomy=CLASSES),
+            surroundings(STREET),
+        )
+    )
+    assert (result.objects, result.seen) == (plain.objects, plain.seen)
+    assert result.families[:2] == plain.families
+    assert result.families[-1].added == survey(town).seen
+    first, *_ = survey_tables(result)
+    assert first.rows[-1][0] == "+ Shops (optional)"
 
 
 def test_many_places_are_sampled(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -80,15 +80,21 @@ def survey_tables(survey: Survey) -> tuple[Table, Table, Table]:
     >>> [table.title for table in survey_tables(result)]
     ['Places by number of objects seen', 'The same, each on its own', 'Objects by family']
     """
-    titles = [family_named(item.family).title for item in survey.families]
+    titles = [
+        family_named(item.family).title + (" (optional)" if item.optional else "")
+        for item in survey.families
+    ]
     families = survey.families
+    optional = ""
+    if any(item.optional for item in families):
+        optional = " 'semsig load' reads what is optional only with --layer +NAME."
     hidden = "hide what is behind them" if survey.occlusion else "are not on the map"
     return (
         _seen_table(
             "Places by number of objects seen",
             [f"{'+ ' if row else ''}{title}" for row, title in enumerate(titles)],
             [item.added for item in families],
-            note=f"Each line has the families above it as well. Buildings {hidden}.",
+            note=f"Each line has the families above it as well. Buildings {hidden}.{optional}",
         ),
         _seen_table("The same, each on its own", titles, [item.own for item in families]),
         Table.of(
