@@ -86,7 +86,7 @@ class ObjectClass:
     """
 
     code: Annotated[int, number("a whole number from 1 to 255", 1, MAX_CODE, whole=True)]
-    symbol: Annotated[str, matching(f"[A-Za-z0-9{LETTERS}]", "one letter or digit")]
+    symbol: Annotated[str, matching("[A-Za-z0-9" + LETTERS + "]", "one letter or digit")]
     name: Annotated[str, matching("[a-z][a-z0-9_]*", "lower-case letters, digits and underscores")]
     title: str = field(compare=False)
     range_m: Annotated[float, metres(MAX_RANGE_M)] | None = None

@@ -141,7 +141,10 @@ def _is_altered(
             groups = np.full(len(rows), -1) if item.groups is None else item.groups[rows]
             _, first_row, thing = np.unique(groups, return_index=True, return_inverse=True)
             numbers.append(np.where(groups < 0, -1, first_row[thing]))
-        altered |= numbers[0] != numbers[1]
+        changed = numbers[0] != numbers[1]
+        for number in numbers:
+            altered |= np.isin(number, number[changed & (number >= 0)])
+        altered |= changed
     return altered
 
 

@@ -371,7 +371,7 @@ def _corners(
     xy, ring = shapely.get_coordinates(rings, return_index=True)
     first = np.flatnonzero(np.diff(ring, prepend=-1))
     last = np.append(first[1:], len(ring)) - 1
-    before = np.vstack([np.zeros((1, 2)), np.diff(xy, axis=0)])
+    before = np.diff(xy, axis=0, prepend=xy[:1])
     before[first] = before[last]  # the first vertex of a ring is its last
     after = np.roll(before, -1, axis=0)
     lengths = np.hypot(*before.T), np.hypot(*after.T)

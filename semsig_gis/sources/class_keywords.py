@@ -211,17 +211,16 @@ def family_words(
 ) -> tuple[Term, ...]:
     """Return the words of `class_words` for families, and others for several classes."""
     tables = _content()["families"]
+    own = families(taxonomy).items()
     return tuple(
-        _terms(
-            ((family, codes, tables[family]) for family, codes in families(taxonomy).items()),
-            languages,
-        )
+        _terms(((family, codes, tables.get(family, {})) for family, codes in own), languages)
     )
 
 
 def families(taxonomy: Taxonomy) -> dict[str, Codes]:
     """Return the class codes of each family, and of each other name for several classes."""
-    names = _content()["families"]
+    own = (item.family for item in taxonomy.classes if item.family)
+    names = dict.fromkeys((*_content()["families"], *own))
     return {name: codes for name in names if (codes := _family_codes(name, taxonomy))}
 
 
@@ -243,7 +242,7 @@ def words_for(name: str) -> tuple[str, ...]:
 def _family_codes(family: str, taxonomy: Taxonomy) -> Codes:
     """Return the class codes of a family, or of a word for several classes."""
     own = [item.name for item in taxonomy.classes if item.family == family]
-    return _codes_of(_content()["families"][family].get(MEMBERS, own), taxonomy)
+    return _codes_of(_content()["families"].get(family, {}).get(MEMBERS, own), taxonomy)
 
 
 def _codes_of(names: Container[str], taxonomy: Taxonomy) -> Codes:

@@ -127,7 +127,8 @@ def check_report(report: UpdateReport, before: SignatureDatabase, after: Signatu
     """Check the counts of a report with a plain comparison of the signatures."""
 
     def signatures(database: SignatureDatabase) -> dict[int, tuple[bytes, ...]]:
-        arrays = (database.codes, database.bearing_units, database.distance_units)
+        extents = () if database.extent_units is None else (database.extent_units,)
+        arrays = (database.codes, database.bearing_units, database.distance_units, *extents)
         cuts = database.offsets[1:-1]
         parts = zip(*([part.tobytes() for part in np.split(a, cuts)] for a in arrays), strict=True)
         return dict(zip(database.cell_ids.tolist(), parts, strict=True))

@@ -118,3 +118,12 @@ def test_word_for_a_family_is_for_its_classes_in_the_taxonomy() -> None:
         class_codes("church", some)
     # The names of classes are theirs, also where a family has the word.
     assert class_codes("tower", every) == (every.by_name("tower").code,)
+
+
+def test_a_family_of_own_classes_is_understood() -> None:
+    stalls = [
+        ObjectClass(230, "1", "fruit_stall", "Fruit stall", family="market_stall"),
+        ObjectClass(231, "2", "fish_stall", "Fish stall", family="market_stall"),
+    ]
+    assert families(paper_taxonomy().extended(stalls))["market_stall"] == (230, 231)
+    assert class_codes("market stall", paper_taxonomy().extended(stalls)) == (230, 231)

@@ -104,7 +104,7 @@ NOISES: Mapping[str, Noise] = MappingProxyType(
     {
         **{spec.name: spec for spec in _LEVELS},
         "generic": _equal_mixture("generic", _LEVELS),
-        "by-hand": _equal_mixture("by-hand", _MARKED),
+        "by-hand": NoiseMixture(specs=_MARKED, weights=(0.3, 0.3, 0.3, 0.1), name="by-hand"),
         **{name: _pictured(name) for name in ("photo", "panorama")},
     }
 )

@@ -100,7 +100,7 @@ def test_views_with_sectors_and_ranges_have_a_likelihood_elsewhere() -> None:
 
 
 def test_rough_bearings_fit_where_exact_ones_do_not() -> None:
-    view = View.of(INDEX.database.signature(0)).turned(20.0)
+    view = View.of(INDEX.database.signature(0)).turned(25.0)
     rough = replace(view, bearing_errors=np.full(len(view), 26.0))
     exact_fit, rough_fit = (goodness_of_fit(INDEX, each, 0, [0.0]) for each in (view, rough))
     assert exact_fit is not None
