@@ -120,8 +120,8 @@
         <translation>Annehmen, dass Ansichten wie im Aufsatz aus der Mitte einer Zelle stammen, statt von irgendwo in ihr.</translation>
     </message>
     <message>
-        <source>At places every 10 m along the streets, the objects in sight are counted, those of optional layers as well. Where few are seen, a view fits many places.</source>
-        <translation>An Stellen alle 10 m entlang der Straßen werden die sichtbaren Objekte gezählt, auch die der optionalen Layer. Wo wenige zu sehen sind, passt eine Ansicht zu vielen Orten.</translation>
+        <source>At places every 10 m along the streets, the objects in sight are counted, and then what optional layers add. Where few are seen, a view fits many places.</source>
+        <translation>An Stellen alle 10 m entlang der Straßen werden die sichtbaren Objekte gezählt, und danach, was optionale Layer hinzufügen. Wo wenige zu sehen sind, passt eine Ansicht zu vielen Orten.</translation>
     </message>
     <message>
         <source>Bearing of the middle of the photo.</source>

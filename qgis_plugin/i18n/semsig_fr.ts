@@ -120,8 +120,8 @@
         <translation>Supposer que les vues sont prises du centre d’une cellule, comme dans l’article, et non de n’importe où en elle.</translation>
     </message>
     <message>
-        <source>At places every 10 m along the streets, the objects in sight are counted, those of optional layers as well. Where few are seen, a view fits many places.</source>
-        <translation>Tous les 10 m le long des rues, les objets visibles sont comptés, y compris ceux des couches facultatives. Là où peu d’objets sont visibles, une vue correspond à de nombreux lieux.</translation>
+        <source>At places every 10 m along the streets, the objects in sight are counted, and then what optional layers add. Where few are seen, a view fits many places.</source>
+        <translation>Tous les 10 m le long des rues, les objets visibles sont comptés, puis ce qu’ajoutent les couches facultatives. Là où peu d’objets sont visibles, une vue correspond à de nombreux lieux.</translation>
     </message>
     <message>
         <source>Bearing of the middle of the photo.</source>
