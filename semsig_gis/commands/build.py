@@ -25,6 +25,18 @@ Role = Literal["buildings", "streets"]
 ROLES: tuple[Role, ...] = ("buildings", "streets")
 
 
+Radius = Annotated[
+    float,
+    Option(
+        "Visibility range for classes without a range in the catalogue.",
+        title="Visibility range",
+        unit="m",
+        low=0.01,
+        high=6000,
+    ),
+]
+
+
 @command(
     "build",
     title="Build signature database",
@@ -65,16 +77,7 @@ class Build:
     step: Annotated[
         float, Option("Side of a cell.", title="Side of a cell", unit="m", low=0.01, high=100_000)
     ] = 10.0
-    radius: Annotated[
-        float,
-        Option(
-            "Visibility range for classes without a range in the catalogue.",
-            title="Visibility range",
-            unit="m",
-            low=0.01,
-            high=6000,
-        ),
-    ] = 30.0
+    radius: Radius = 30.0
     levels: Annotated[
         int,
         Option(

@@ -21,6 +21,18 @@ def catalogs() -> tuple[str, ...]:
     return catalog_names()
 
 
+Files = Annotated[list[Path], Option("Files, or a folder of files.", positional=True, reads=True)]
+Catalogs = Annotated[
+    list[str] | None,
+    Option(
+        "Catalogue, by name or .toml file; not needed for OpenStreetMap and Overture. Repeat "
+        "to merge several, best first.",
+        title="Catalogues",
+        metavar="NAME|FILE",
+        reads=True,
+        suggestions=catalogs,
+    ),
+]
 Crs = Annotated[
     str | None,
     Option(
@@ -233,20 +245,8 @@ class LoadOptions:
 class Load(LoadOptions):
     """Read files of open data into street objects."""
 
-    files: Annotated[
-        list[Path], Option("Files, or a folder of files.", positional=True, reads=True)
-    ]
-    catalog: Annotated[
-        list[str] | None,
-        Option(
-            "Catalogue, by name or .toml file; not needed for OpenStreetMap and Overture. Repeat "
-            "to merge several, best first.",
-            title="Catalogues",
-            metavar="NAME|FILE",
-            reads=True,
-            suggestions=catalogs,
-        ),
-    ] = None
+    files: Files
+    catalog: Catalogs = None
     crs: Crs = None
     clip: Annotated[
         str | None,

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from semsig_gis.commands.load import Crs, catalogs
+from semsig_gis.commands.build import Radius
+from semsig_gis.commands.load import Catalogs, Crs, Files
 from semsig_gis.commands.model import Option, Reporter, Result, command
 from semsig_gis.database import SurveyRecord
 
@@ -30,20 +31,8 @@ class SurveyPlace:
     layers add. Where few are seen, a view fits many places.
     """
 
-    files: Annotated[
-        list[Path], Option("Files, or a folder of files.", positional=True, reads=True)
-    ]
-    catalog: Annotated[
-        list[str] | None,
-        Option(
-            "Catalogue, by name or .toml file; not needed for OpenStreetMap and Overture. Repeat "
-            "to merge several, best first.",
-            title="Catalogues",
-            metavar="NAME|FILE",
-            reads=True,
-            suggestions=catalogs,
-        ),
-    ] = None
+    files: Files
+    catalog: Catalogs = None
     area: Annotated[
         Path | None,
         Option(
@@ -52,16 +41,7 @@ class SurveyPlace:
             reads=True,
         ),
     ] = None
-    radius: Annotated[
-        float,
-        Option(
-            "Visibility range for classes without a range in the catalogue.",
-            title="Visibility range",
-            unit="m",
-            low=0.01,
-            high=6000,
-        ),
-    ] = 30.0
+    radius: Radius = 30.0
     crs: Crs = None
 
     def run(self, reporter: Reporter) -> Result:
