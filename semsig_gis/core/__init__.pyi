@@ -185,3 +185,5 @@ from .threads import cancellable as cancellable
 from .threads import cores as cores
 from .threads import each_in_order as each_in_order
 from .threads import share_rows as share_rows
+from .towns import Town as Town
+from .towns import nearest_town as nearest_town
