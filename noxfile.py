@@ -23,7 +23,7 @@ HERE = Path(__file__).parent
 PROJECT = nox.project.load_toml("pyproject.toml")
 PYTHONS = nox.project.python_versions(PROJECT)
 CONSTRAINTS = {"oldest": "constraints-oldest.txt", "newest": "constraints.txt"}
-EXTRAS = "cluster,detect,plot,raster,serve,stac"
+EXTRAS = "cluster,detect,heic,plot,raster,serve,stac"
 TOOLS = (
     "colour-science",
     "hatchling",

@@ -100,14 +100,27 @@ def decompression_bomb() -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data)
 
 
-def picture(**sections: Mapping[Any, Any]) -> bytes:
-    """Return a JPEG picture with EXIF tags in the sections ``image``, ``exif`` and ``gps``."""
+def picture(
+    kind: str = "JPEG",
+    *,
+    size: tuple[int, int] = (400, 300),
+    xmp: Mapping[str, object] | None = None,
+    **sections: Mapping[Any, Any],
+) -> bytes:
+    """Return a JPEG picture with EXIF tags in the sections ``image``, ``exif`` and ``gps``.
+
+    `kind` is another format, `size` another size, and `xmp` are values of Google's panoramas.
+    """
     exif = Image.Exif()
     exif.update(sections.get("image", {}))
     exif.get_ifd(IFD.Exif).update(sections.get("exif", {}))
     exif.get_ifd(IFD.GPSInfo).update(sections.get("gps", {}))
     content = io.BytesIO()
-    Image.new("RGB", (400, 300)).save(content, "JPEG", exif=exif)
+    more: dict[str, Any] = {}
+    if xmp is not None:
+        values = " ".join(f'GPano:{name}="{value}"' for name, value in xmp.items())
+        more["xmp"] = f"<rdf:Description {values}/>".encode()
+    Image.new("RGB", size).save(content, kind, exif=exif.tobytes(), **more)
     return content.getvalue()
 
 

@@ -313,6 +313,10 @@ def _notes(unknown: list[str], tally: Tally) -> Iterator[str]:
     if tally.unusable:
         pictures = _many(len(tally.unusable), "picture")
         yield f"left out: {pictures}: {next(iter(tally.unusable.values()))}"
+    if tally.unread:
+        pictures = _many(len(tally.unread), "picture")
+        reason = next(iter(tally.unread.values()))
+        yield f"not opened, as all is known without: {pictures}: {reason}"
     if tally.below_min_score:
         yield f"left out: {_many(tally.below_min_score, 'box', 'boxes')} below --min-score"
     if tally.no_boxes:
@@ -329,11 +333,22 @@ def _notes(unknown: list[str], tally: Tally) -> Iterator[str]:
             names = ", ".join(f"{label} {count:,}" for label, count in frequent)
             more = f" and {len(labels) - MOST_NAMES:,} more" if len(labels) > MOST_NAMES else ""
             yield f"left out: {boxes} {what}: {names}{more}"
+    yield from _heading_notes(tally)
+
+
+def _heading_notes(tally: Tally) -> Iterator[str]:
+    """Yield which headings are unknown or not measured, and from which north the others are."""
     if tally.unknown_heading:
         pictures = _many(tally.unknown_heading, "picture")
         yield (
             f"the heading of {pictures} is unknown; bearings are measured from the viewing "
             "direction"
+        )
+    if tally.travels:
+        headings = _many(tally.travels, "heading")
+        yield (
+            f"the direction of travel in the EXIF is taken as that of the camera: {headings}; give "
+            "--heading if the camera did not look ahead"
         )
     for north, count in tally.north.items():
         headings = _many(count, "heading")

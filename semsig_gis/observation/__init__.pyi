@@ -7,6 +7,7 @@ from .detectors.camera import POSSIBLE_FOV as POSSIBLE_FOV
 from .detectors.camera import USUAL_FOV as USUAL_FOV
 from .detectors.camera import Camera as Camera
 from .detectors.camera import Projection as Projection
+from .detectors.exif import PANORAMAS as PANORAMAS
 from .detectors.exif import picture_shot as picture_shot
 from .detectors.exif import read_exif as read_exif
 from .detectors.formats import FORMATS as FORMATS

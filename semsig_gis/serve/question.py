@@ -31,6 +31,7 @@ from semsig_gis.observation import (
     DEGREE_DIGITS,
     ERROR_DIGITS,
     METRE_DIGITS,
+    PANORAMAS,
     POSSIBLE_FOV,
     USUAL_FOV,
     Camera,
@@ -115,6 +116,7 @@ class PagePhoto(FileTable, extra="ignore"):
     height: _Side | None = None
     fov: _Fov | None = None
     projection: Any = None
+    horizon: _Pixel | None = None
     heading: _Degrees | None = None
     heading_error: Any = None
     marks: Annotated[tuple[_PhotoMark, ...], length(0, MOST_MARKS)] = ()
@@ -128,7 +130,13 @@ class PagePhoto(FileTable, extra="ignore"):
             raise InputError("the width or height of a photo is missing; give pixels.")
         projection: Any = self.projection or "pinhole"
         fov = USUAL_FOV.get(str(projection), unknown_fov) if self.fov is None else self.fov
-        return Camera(width=self.width, height=self.height, fov=fov, projection=projection)
+        return Camera(
+            width=self.width,
+            height=self.height,
+            fov=fov,
+            projection=projection,
+            horizon=self.horizon if str(projection) in PANORAMAS else None,
+        )
 
     @property
     def fov_unknown(self) -> bool:

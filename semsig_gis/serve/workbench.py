@@ -246,7 +246,7 @@ class Workbench:
         """Return camera and place of a picture, from its metadata; InputError if it is none."""
         shot = picture_shot(content, name)
         width, height = shot.size or (0, 0)
-        panorama = shot.focal is None and width == PANORAMA_RATIO * height
+        panorama = not (shot.focal or shot.camera) and width == PANORAMA_RATIO * height
         # A picture of this ratio without a focal length is taken for a full panorama.
         if panorama:
             shot = replace(shot, camera="equirectangular")
@@ -254,7 +254,11 @@ class Workbench:
         notes = []
         if panorama:
             notes.append("It is twice as wide as high, so it is treated as a full panorama.")
+        elif shot.camera and fov:
+            notes.append(f"It is a panorama of {fov:.0f}°, as it says itself.")
         heading = shot.heading
+        if heading is not None and shot.travels:
+            notes.append("Its direction is that of travel; correct it if you did not look ahead.")
         if heading is not None and shot.north is not None:
             crs, bounds = self.database.crs, self.database.bounds
             north = North.of("magnetic" if shot.north == "magnetic" else "true", crs, bounds)
@@ -270,6 +274,7 @@ class Workbench:
             "height": height,
             "projection": shot.camera or "pinhole",
             "fov": None if fov is None else round(fov, 2),
+            "horizon": None if shot.horizon is None else round(shot.horizon * height, 1),
             "heading": None if heading is None else round(heading, 2),
             "heading_error": None if heading is None else shot.heading_error,
             "place": None if shot.position is None else list(shot.position),
@@ -606,5 +611,6 @@ def _shot(photo: PagePhoto) -> Shot:
         camera=camera.projection,
         fov=camera.fov,
         heading=photo.heading,
+        horizon=None if photo.horizon is None else photo.horizon / camera.height,
         size=(camera.width, camera.height),
     )

@@ -67,6 +67,9 @@ class Camera:
         (equidistant).
     pitch, roll : float, default 0
         Angle of the camera above the horizon, and clockwise rotation about its axis, in degrees.
+    horizon : float, optional
+        Row of the camera's axis in pixels, beyond the picture if need be; default its middle. Only
+        a cropped panorama has another.
 
     Raises
     ------
@@ -88,6 +91,7 @@ class Camera:
     projection: Projection = "pinhole"
     pitch: float = 0.0
     roll: float = 0.0
+    horizon: float | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
         if self.projection not in get_args(Projection):
@@ -107,6 +111,18 @@ class Camera:
         )
         require_number("the pitch", self.pitch, least=-90, most=90, unit="degrees")
         require_number("the roll", self.roll, least=-180, most=180, unit="degrees")
+        require_number(
+            "the row of the horizon",
+            self.axis_row,
+            least=-MOST_PIXELS,
+            most=MOST_PIXELS,
+            unit="pixels",
+        )
+
+    @property
+    def axis_row(self) -> float:
+        """Row of the camera's axis in pixels."""
+        return self.height / 2.0 if self.horizon is None else self.horizon
 
     @property
     def focal(self) -> float:
@@ -166,13 +182,13 @@ class Camera:
                 if self.projection == "equirectangular"
                 else down / np.where(flat > 0, flat, np.nan)
             )
-        return np.stack([self.width / 2.0 + across, self.height / 2.0 + along], axis=-1)
+        return np.stack([self.width / 2.0 + across, self.axis_row + along], axis=-1)
 
     def directions(self, pixels: ArrayLike) -> NDArray[np.float64]:
         """Return the direction of each pixel, shape (..., 3), the inverse of `pixels`."""
         columns, rows = np.moveaxis(np.asarray(pixels, dtype=np.float64), -1, 0)
         across = (columns - self.width / 2.0) / self.focal
-        along = (rows - self.height / 2.0) / self.focal
+        along = (rows - self.axis_row) / self.focal
         if self.projection == "pinhole":
             right, down, ahead = across, along, np.ones_like(across)
         elif self.projection == "fisheye":

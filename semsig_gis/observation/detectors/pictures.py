@@ -22,6 +22,9 @@ Corners = tuple[float, float, float, float]
 FOLDERS = {"labels": "images", "label_2": "image_2", "ann": "img", "Annotations": "JPEGImages"}
 """Folders of pictures of data sets, by the folder of their labels."""
 
+# Boxes are of another picture if the ratio of its sides differs by more.
+SAME_SHAPE = 0.05
+
 # Roboflow names its copy of street.jpg "street_jpg.rf.0a1b2c.jpg".
 ROBOFLOW = re.compile(r"(?i)(.+)_(jpe?g|png|webp|tiff?)\.rf\.\w+(\.\w+)?")
 
@@ -45,7 +48,9 @@ class Shot:
 
     `focal` is the focal length divided by the longer side of the picture, `position` latitude and
     longitude, `time` in ISO 8601 with a time zone, and `north` the name of the north of the
-    heading. Pictures with the same `place` are one view.
+    heading; `travels` is whether the heading is only the direction of travel. `horizon` is the row
+    of the horizon of a cropped panorama, as a share of its height. Pictures with the same `place`
+    are one view.
     """
 
     camera: Projection | None = None
@@ -54,8 +59,10 @@ class Shot:
     heading: float | None = None
     heading_error: float | None = None
     north: str | None = None
+    travels: bool | None = None
     pitch: float | None = None
     roll: float | None = None
+    horizon: float | None = None
     size: tuple[int, int] | None = None
     position: tuple[float, float] | None = None
     time: str | None = None
@@ -64,12 +71,12 @@ class Shot:
     def filled(self, other: Shot) -> Shot:
         """Return a copy with unknown values taken from another.
 
-        A field of view has priority over the other's focal length. The error and the north of a
-        heading are from the same source as the heading.
+        A field of view has priority over the other's focal length. The error, the north and the
+        kind of a heading are from the same source as the heading.
         """
         fixed = {"focal"} if self.fov is not None else set()
         if self.heading is not None:
-            fixed |= {"heading_error", "north"}
+            fixed |= {"heading_error", "north", "travels"}
         names = {item.name for item in fields(self)} - fixed
         values = {name: getattr(other, name) for name in names if getattr(self, name) is None}
         return replace(self, **values)
@@ -134,6 +141,11 @@ def box_of(
     if not 0 <= value <= 1:
         raise InputError(f"{where} has the score {value:g}; give a number from 0 to 1.")
     return Box(label=str(label), corners=numbers, score=value, whole=whole)
+
+
+def same_shape(first: tuple[float, float], second: tuple[float, float]) -> bool:
+    """Return whether two pictures have the same ratio of sides, as one may be a smaller copy."""
+    return math.isclose(first[0] * second[1], first[1] * second[0], rel_tol=SAME_SHAPE)
 
 
 def size_of(width: Any, height: Any) -> tuple[int, int] | None:  # noqa: ANN401 - any JSON

@@ -21,8 +21,8 @@ from semsig_gis.core import (
     wrap_degrees,
 )
 from semsig_gis.observation.detectors.camera import USUAL_FOV, Camera, Projection
-from semsig_gis.observation.detectors.exif import read_exif
-from semsig_gis.observation.detectors.pictures import Shot
+from semsig_gis.observation.detectors.exif import PANORAMAS, read_exif
+from semsig_gis.observation.detectors.pictures import Shot, same_shape
 from semsig_gis.observation.view import CLASSES, MOST_RANGE_ERROR, Photo, View
 from semsig_gis.sources import built_in_taxonomy
 from semsig_gis.storage import read_rows, row_value
@@ -42,9 +42,10 @@ Places = Literal["each", "gps", "all"]
 
 SAME_PLACE_M = 5.0
 METRES_PER_DEGREE = 111_320.0
-PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff")
-# Boxes are of another picture if the ratio of its sides differs by more.
-SAME_SHAPE = 0.05
+PICTURE_SUFFIXES = (
+    *(".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff"),
+    *(".heic", ".heif", ".avif", ".mpo"),
+)
 
 # A box this near to the edge of the picture is cut off: pixels, and share of the side.
 EDGE_PIXELS, EDGE_SHARE = 1.0, 0.002
@@ -67,9 +68,13 @@ class Tally:
     unknown: Counter[str] = field(default_factory=Counter)
     not_in_city: Counter[str] = field(default_factory=Counter)
     unknown_heading: int = 0
+    travels: int = 0
+    """Number of headings that are directions of travel."""
     north: Counter[str] = field(default_factory=Counter)
     unusable: dict[str, str] = field(default_factory=dict)
     """Why pictures were left out, by name."""
+    unread: dict[str, str] = field(default_factory=dict)
+    """Why files of pictures were not read, by name, where no data of them was needed."""
     times: dict[str, str] = field(default_factory=dict)
     """Time of the first picture of a view, by the name of the view, if it is known."""
 
@@ -171,7 +176,7 @@ class ViewBuilder:
         positions: list[tuple[tuple[float, float], str]] = []
         for number, picture in enumerate(pictures):
             try:
-                shot = self._shot(picture)
+                shot = self._shot(picture, tally)
                 self._camera(picture, shot)
             except InputError as error:
                 tally.unusable[picture.name] = str(error)
@@ -204,15 +209,25 @@ class ViewBuilder:
         ]
         return views, tally
 
-    def _shot(self, picture: AnnotatedPicture) -> Shot:
-        """Combine camera data of a picture from options, annotations and EXIF, by priority."""
+    def _shot(self, picture: AnnotatedPicture, tally: Tally) -> Shot:
+        """Combine camera data of a picture from options, annotations and EXIF, by priority.
+
+        A file that cannot be read is counted if size, field of view and heading are known anyway.
+        """
         own = next((self.shots[name] for name in picture.names if name in self.shots), Shot())
         if own.heading_error is None:
             own = replace(own, heading_error=self.shot.heading_error)
         shot = own.filled(replace(self.shot, size=None)).filled(picture.shot)
         if file := self._file(picture):
-            exif = read_exif(file)
-            if shot.size and exif.size and not _same_shape(shot.size, exif.size):
+            try:
+                exif = read_exif(file)
+            except InputError as error:
+                known = shot.filled(Shot(size=self.shot.size))
+                if known.size is None or known.heading is None or field_of_view(known) is None:
+                    raise
+                tally.unread[picture.name] = str(error)
+                exif = Shot()
+            if shot.size and exif.size and not same_shape(shot.size, exif.size):
                 boxes, upright = (f"{wide} x {high}" for wide, high in (shot.size, exif.size))
                 raise InputError(
                     f"the boxes of {picture.name} are in a picture of {boxes} pixels, but {file} "
@@ -265,11 +280,14 @@ class ViewBuilder:
             projection=shot.camera or "pinhole",
             pitch=shot.pitch or 0.0,
             roll=shot.roll or 0.0,
+            horizon=None
+            if shot.horizon is None or shot.camera not in PANORAMAS
+            else shot.horizon * height,
         )
 
     def located_boxes(self, picture: AnnotatedPicture, tally: Tally) -> LocatedBoxes:
         """Return the boxes of a picture with a known class, and count them; raises as `views`."""
-        shot = self._shot(picture)
+        shot = self._shot(picture, tally)
         camera = self._camera(picture, shot)
         boxes = [(box, meaning) for box in picture.boxes if (meaning := self._meaning(box, tally))]
         scale = np.array([camera.width, camera.height] * 2, dtype=float)
@@ -315,6 +333,7 @@ class ViewBuilder:
             heading, error = 0.0, math.inf
         elif boxes.shot.north is not None:
             tally.north[boxes.shot.north] += 1
+            tally.travels += bool(boxes.shot.travels)
         certain = bool((scores.max(axis=1, initial=0.0) == 1.0).all())
         any_range = bool(np.isfinite(ranges).any())
         bearings = wrap_degrees(heading + boxes.bearings)
@@ -456,11 +475,6 @@ def north_sigma(error: str | float) -> float:
         raise InputError(
             f"the error of a heading is {error!r}; give degrees or 'unknown'."
         ) from fault
-
-
-def _same_shape(first: tuple[int, int], second: tuple[int, int]) -> bool:
-    """Return whether two pictures have the same ratio of sides, as one may be a smaller copy."""
-    return math.isclose(first[0] * second[1], first[1] * second[0], rel_tol=SAME_SHAPE)
 
 
 def _metres(first: tuple[float, float], second: tuple[float, float]) -> float:

@@ -116,8 +116,8 @@ semsig.showScenes = (session) => {
 };
 semsig.readBoxes = async (session, files) => {
   const photos = session.scenes.filter((scene) => scene.marks);
-  const cameraOf = ({name, width, height, fov, heading, projection}) => (
-    {name, width, height, fov, heading, projection});
+  const cameraOf = ({name, width, height, fov, heading, projection, horizon}) => (
+    {name, width, height, fov, heading, projection, horizon});
   const labels = files.find(({name}) => name === "classes.txt");  // labels of YOLO boxes
   const classes = await labels?.text();
   for (const file of files.filter((other) => other !== labels)) {

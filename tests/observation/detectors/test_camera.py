@@ -54,6 +54,18 @@ def test_bearings_and_ranges_from_boxes_of_rendered_scene(
     assert (off <= 1.5 / (result.pixels - 1) + 0.002).all()
 
 
+@pytest.mark.parametrize("projection", ["equirectangular", "cylindrical"])
+def test_cropped_panorama_shows_the_same_as_the_full_one(projection: Projection) -> None:
+    full = Camera(width=4000, height=2000, fov=360, projection=projection)
+    part = Camera(width=1000, height=600, fov=90, projection=projection, horizon=300 - 150)
+    boxes = np.array([[1900.0, 900.0, 1950.0, 1200.0], [2200.0, 950.0, 2210.0, 1000.0]])
+    whole = full.upright_objects(boxes)
+    cut = part.upright_objects(boxes - [1500, 850, 1500, 850])
+    for name in ("bearings", "rises", "pixels"):
+        assert getattr(cut, name) == pytest.approx(getattr(whole, name), abs=1e-6)
+    assert part.sectors() == ((-45.0, 45.0),)
+
+
 @pytest.mark.parametrize("projection", PROJECTIONS)
 def test_directions_are_inverse_of_pixels(projection: Projection) -> None:
     camera = Camera(width=400, height=300, fov=90, projection=projection, pitch=-20, roll=130)

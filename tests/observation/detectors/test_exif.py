@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import TYPE_CHECKING, Any
 
+import pillow_heif
 import pytest
 from PIL.ExifTags import GPS, Base
 from sentences import refused
@@ -12,14 +14,15 @@ from workbench import picture
 
 from semsig_gis.core import InputError
 from semsig_gis.observation import read_exif
+from semsig_gis.observation.detectors.exif import open_upright
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
 
-def save(folder: Path, **groups: Any) -> Path:  # noqa: ANN401 - tags of any kind
-    """Write a picture with EXIF tags of the groups ``image``, ``exif`` and ``gps``."""
+def save(folder: Path, **groups: Any) -> Path:  # noqa: ANN401 - of any kind
+    """Write a picture with EXIF tags of the groups ``image``, ``exif`` and ``gps``, or XMP."""
     (folder / "a.jpg").write_bytes(picture(**groups))
     return folder / "a.jpg"
 
@@ -93,6 +96,104 @@ def test_missing_or_invalid_tags_are_unknown(
 ) -> None:
     shot = read_exif(save(tmp_path, **groups))
     assert (shot.focal, shot.heading, shot.position) == (None, None, None)
+
+
+@pytest.mark.parametrize("kind", ["JPEG", "PNG", "WEBP", "AVIF", "TIFF", "MPO", "HEIF"])
+@pytest.mark.parametrize("orientation", [1, 6])
+def test_every_kind_of_picture_has_its_tags_and_its_upright_size(
+    kind: str, orientation: int, tmp_path: Path
+) -> None:
+    pillow_heif.register_heif_opener()  # also for writing
+    file = save(
+        tmp_path,
+        kind=kind,
+        image={Base.Orientation: orientation},
+        exif={Base.FocalLengthIn35mmFilm: 26},
+        gps={GPS.GPSImgDirection: 123.5},
+    )
+    shot = read_exif(file)
+    assert shot.focal == pytest.approx(26 / math.hypot(36, 24) * 1.25)
+    assert shot.heading == 123.5
+    assert shot.size == open_upright(file).size
+
+
+@pytest.mark.parametrize(
+    ("gps", "expected"),
+    [
+        ({GPS.GPSTrack: 200.0}, (200.0, 20.0, "true", True)),
+        (
+            {GPS.GPSTrack: 200.0, GPS.GPSTrackRef: "M", GPS.GPSSpeed: 9.5},
+            (200, 20, "magnetic", True),
+        ),
+        ({GPS.GPSTrack: 200.0, GPS.GPSImgDirection: 90.0}, (90.0, 10.0, "true", False)),
+        ({GPS.GPSTrack: 200.0, GPS.GPSSpeed: 0.0}, (None,)),
+        ({GPS.GPSTrack: 400.0}, (None,)),
+    ],
+)
+def test_direction_of_travel_is_a_heading_where_there_is_no_other(
+    gps: Mapping[Any, Any], expected: tuple[object, ...], tmp_path: Path
+) -> None:
+    shot = read_exif(save(tmp_path, gps=gps))
+    found = (shot.heading, shot.heading_error, shot.north, shot.travels)
+    assert found[: len(expected)] == expected
+
+
+SPHERE = {"ProjectionType": "equirectangular", "PoseHeadingDegrees": "90.0"}
+FULL = {"FullPanoWidthPixels": 4000, "FullPanoHeightPixels": 2000}
+PART = {"CroppedAreaImageWidthPixels": 1000, "CroppedAreaImageHeightPixels": 750}
+
+
+@pytest.mark.parametrize(
+    ("xmp", "size", "expected"),
+    [
+        (SPHERE, (400, 200), ("equirectangular", 360, 90, None)),
+        (SPHERE | FULL, (400, 200), ("equirectangular", 360, 90, None)),
+        # A quarter of the turn that ends at the middle of the full panorama.
+        (
+            SPHERE | FULL | PART | {"CroppedAreaLeftPixels": 1000, "CroppedAreaTopPixels": 700},
+            (400, 300),
+            ("equirectangular", 90, 45, 0.4),
+        ),
+        (SPHERE | FULL | PART, (400, 300), ("equirectangular", 90, 90, None)),
+        (
+            SPHERE | FULL | PART | {"ProjectionType": "cylindrical", "CroppedAreaTopPixels": -300},
+            (400, 300),
+            ("cylindrical", 90, 90, 0.4),
+        ),
+        # Of a part that was cut or turned later.
+        (SPHERE | FULL | PART, (300, 400), (None, None, None, None)),
+        # The long photograph of a phone, whose projection is not known.
+        ({"PoseHeadingDegrees": 300}, (1600, 400), (None, None, 300, None)),
+        ({"ProjectionType": "cubemap"}, (400, 300), (None, None, None, None)),
+        (
+            SPHERE | {"PoseHeadingDegrees": "north"},
+            (400, 200),
+            ("equirectangular", 360, None, None),
+        ),
+    ],
+)
+def test_xmp_of_panorama(
+    xmp: Mapping[str, object], size: tuple[int, int], expected: tuple[object, ...], tmp_path: Path
+) -> None:
+    exif = {Base.FocalLengthIn35mmFilm: 26}
+    shot = read_exif(save(tmp_path, size=size, xmp=xmp, exif=exif))
+    assert (shot.camera, shot.fov, shot.heading, shot.horizon) == expected
+    # Only of a photograph as it was taken does the focal length say anything.
+    assert (shot.focal is None) == ("cubemap" not in xmp.values())
+
+
+HEIC = b"\0\0\0\x18ftypheic\0\0\0\0mif1heic" + bytes(100)
+
+
+def test_heic_needs_its_extra_and_damaged_heic_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.heic").write_bytes(HEIC)
+    with refused(InputError, "damaged HEIC"):
+        read_exif(tmp_path / "a.heic")
+    monkeypatch.setitem(sys.modules, "pillow_heif", None)
+    with refused(InputError, "HEIC", "pip install 'semsig_gis[heic]'", "JPEG", "--fov"):
+        read_exif(tmp_path / "a.heic")
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:

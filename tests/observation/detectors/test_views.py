@@ -98,6 +98,18 @@ def test_score_is_probability_of_class_and_rest_of_any_class() -> None:
     assert row["types"] == "DL"
 
 
+def test_picture_that_cannot_be_read_is_no_obstacle_where_all_is_known(tmp_path: Path) -> None:
+    (tmp_path / "a.heic").write_bytes(b"\0\0\0\x18ftypheic\0\0\0\0mif1heic")
+    builder = replace(BUILDER, folders=[tmp_path])
+    boxes = picture(box(), name="a.heic")
+    ((_, view),), tally = builder.views([boxes])
+    assert view.to_dict(TAXONOMY) == single_view(BUILDER, boxes).to_dict(TAXONOMY)
+    assert "HEIC" in tally.unread["a.heic"]
+    for shot in (Shot(fov=90.0), Shot(heading=0.0), Shot(fov=90.0, heading=0.0)):
+        with refused(InputError, "HEIC"):
+            replace(builder, shot=shot).views([picture(box(), name="a.heic", size=None)])
+
+
 def test_ignored_boxes_are_counted() -> None:
     boxes = [box(score=0.2), box("person"), box("lion"), box("lion"), box("fire hydrant"), box()]
     city = replace(BUILDER, taxonomy=paper_taxonomy())
