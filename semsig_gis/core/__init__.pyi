@@ -172,6 +172,7 @@ from .temporary import MACHINE_PREFIX as MACHINE_PREFIX
 from .temporary import TEMPORARY_PREFIX as TEMPORARY_PREFIX
 from .temporary import is_abandoned as is_abandoned
 from .temporary import locked as locked
+from .temporary import place_locked as place_locked
 from .temporary import remove_abandoned as remove_abandoned
 from .temporary import temporary_folder as temporary_folder
 from .text import escaped as escaped

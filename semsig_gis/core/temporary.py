@@ -2,7 +2,7 @@
 
 A killed process cannot remove its folders. So each folder contains a file that its process keeps
 locked, and the next process that needs such a folder in the same place removes all folders with
-an unlocked file.
+an unlocked file. A folder with a fixed name is the lock of a place (`place_locked`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ import os
 import platform
 import shutil
 import tempfile
+import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,6 +33,9 @@ MACHINE_PREFIX = (
 LOCK_FILE = f"{TEMPORARY_PREFIX}owner"
 BACKUP_FOLDER = f"{TEMPORARY_PREFIX}aside"
 """Subfolder for a folder that is being replaced; it is put back if the process is killed."""
+PATIENCE_S = 3.0
+"""Time to wait for another process before saying so."""
+LOOK_S = 0.05
 
 
 @contextlib.contextmanager
@@ -62,12 +67,8 @@ def remove_abandoned(parent: Path) -> None:
             except FileNotFoundError:
                 folder.rmdir()  # if it is empty
                 continue
-            if lock is None:
-                continue
-            for backup in (folder / BACKUP_FOLDER).glob("*"):
-                if not os.path.lexists(parent / backup.name):
-                    backup.rename(parent / backup.name)
-            _remove(folder, lock)
+            if lock is not None:
+                _remove(folder, lock)
 
 
 def is_abandoned(folder: Path) -> bool:
@@ -124,17 +125,110 @@ def _create_locked(parent: Path) -> tuple[Path, int]:
 
 
 def _remove(folder: Path, lock: int) -> None:
-    """Remove a folder, its locked file last; if that fails, the next process tries again."""
-    try:
+    """Remove a folder, its locked file last; if that fails, the next process tries again.
+
+    The contents of a backup folder are put back first if nothing has replaced them.
+    """
+    removes_open_files = os.name != "nt"
+    is_empty = False
+    with contextlib.suppress(OSError):
+        for backup in (folder / BACKUP_FOLDER).glob("*"):
+            if not os.path.lexists(folder.parent / backup.name):
+                backup.rename(folder.parent / backup.name)
         for entry in [*folder.iterdir()]:
             if entry.is_dir() and not entry.is_symlink():
                 shutil.rmtree(entry)
             elif entry.name != LOCK_FILE:
                 entry.unlink()
-    except OSError:
-        return
-    finally:
-        os.close(lock)
+        is_empty = True
+        if removes_open_files:
+            # While it is locked: a process that waits for it must not get a lock without a name.
+            (folder / LOCK_FILE).unlink()
     with contextlib.suppress(OSError):
-        (folder / LOCK_FILE).unlink()
-        folder.rmdir()
+        os.close(lock)
+    if is_empty:
+        with contextlib.suppress(OSError):
+            if not removes_open_files:
+                (folder / LOCK_FILE).unlink()
+            folder.rmdir()
+
+
+@contextlib.contextmanager
+def place_locked(target: Path) -> Iterator[bool]:
+    """Lock the name of a file or folder for this process; give whether that succeeded.
+
+    If another process of this machine has locked it, wait, and after a few seconds warn for whom.
+    It does not succeed where files cannot be locked, or the parent folder is not writable. The
+    block must not lock the same name again.
+    """
+    name = hashlib.blake2b(os.fsencode(target.name), digest_size=8).hexdigest()
+    folder = target.with_name(f"{MACHINE_PREFIX}{name}")
+    try:
+        lock = _lock_folder(folder, target)
+    except OSError:
+        lock = None
+    if lock is None:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        _remove(folder, lock)
+
+
+def _lock_folder(folder: Path, target: Path) -> int | None:
+    """Return the open and locked file of a folder with a fixed name; None if it cannot be locked.
+
+    The file has the number of the process, and the time.
+    """
+    path = folder / LOCK_FILE
+    while True:
+        folder.mkdir(exist_ok=True)
+        try:
+            lock = os.open(path, os.O_CREAT | os.O_RDWR, 0o644)
+        except FileNotFoundError:  # another process has just removed it
+            continue
+        try:
+            if not _locked_in_time(lock, path, target):
+                path.unlink()
+                return None
+            # The last owner has removed the file that this process waited for.
+            if path.exists() and os.path.samestat(os.fstat(lock), path.stat()):
+                with contextlib.suppress(OSError):  # a full disk
+                    os.truncate(lock, 0)
+                    os.write(lock, f"{os.getpid()} {time.time():.0f}".encode())
+                kept, lock = lock, -1
+                return kept
+        finally:
+            if lock >= 0:
+                os.close(lock)
+
+
+def _locked_in_time(lock: int, path: Path, target: Path) -> bool:
+    """Lock an open file as `locked` does; after a few seconds, warn which process has it."""
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline:
+        try:
+            if filelock.lock_descriptor(lock, blocking=False):
+                return True
+        except OSError:
+            return False
+        time.sleep(LOOK_S)
+    warnings.warn(f"waiting for {_owner(path)}, which is writing {target}", stacklevel=2)
+    return locked(lock, wait=True)
+
+
+def _owner(path: Path) -> str:
+    """Return a description of the process that has locked the file of `_lock_folder`."""
+    try:
+        number, since = map(int, path.read_bytes().split())
+    except (OSError, ValueError):  # Windows lets nobody read a locked file
+        return "another program"
+    import psutil  # noqa: PLC0415 - 16 ms, and most commands do not wait
+
+    with contextlib.suppress(psutil.Error):
+        if psutil.Process(number).status() == psutil.STATUS_STOPPED:
+            return f"process {number}, which is stopped (kill -CONT {number} continues it)"
+    return f"process {number}, at work since {time.strftime('%H:%M:%S', time.localtime(since))}"

@@ -9,10 +9,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import TEMPORARY_PREFIX, InputError, is_abandoned, remove_abandoned
+from semsig_gis.core import (
+    TEMPORARY_PREFIX,
+    InputError,
+    is_abandoned,
+    place_locked,
+    remove_abandoned,
+)
 from semsig_gis.database.city import open_city
 from semsig_gis.database.store import store_path, waiting_store
-from semsig_gis.storage import folder_locked, reason
+from semsig_gis.storage import reason
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -71,7 +77,7 @@ def remove_companions(
     if dry_run or not unneeded:
         return unneeded
     # After the wait, a store that another program was moving to its final folder is gone.
-    with folder_locked(Path(os.path.realpath(database)).parent):
+    with place_locked(store_path(database)):
         removed = tuple(companion for companion in unneeded if os.path.lexists(companion.path))
         for companion in removed:
             try:

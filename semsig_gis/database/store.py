@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -29,6 +30,7 @@ from semsig_gis.core import (
     InputError,
     ObjectIndex,
     crs_label,
+    place_locked,
 )
 from semsig_gis.database.file import (
     INPUTS,
@@ -47,10 +49,10 @@ from semsig_gis.objects import licenses_of, open_objects, save_objects
 from semsig_gis.storage import (
     EMPTY_BOX,
     UNREADABLE,
-    folder_locked,
     move_folder,
     parse_json,
     read_whole,
+    reason,
     whole_file,
     whole_folder,
 )
@@ -257,20 +259,40 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     ...     len(open_store(file).objects) == len(demo_objects)
     True
     """
-    final = store_path(path)
+    file, waiting = Path(path), waiting_store(path)
+    try:
+        _save_with_store(database, store, file)
+    except InputError as error:
+        if waiting.exists() and not _awaited(file):
+            left = f"; {waiting} could not be removed, and is not needed."
+            raise InputError(str(error).removesuffix(".") + left) from error
+        raise
+
+
+def _save_with_store(database: SignatureDatabase, store: ObjectStore, file: Path) -> None:
+    final, waiting = store_path(file), waiting_store(file)
     with contextlib.ExitStack() as stack:
-        with whole_file(path) as partial:
-            try:
-                save_database(database, partial)
-            except InputError as error:  # its message has the temporary path
-                raise InputError(str(error).replace(str(partial), str(path))) from error
+        with whole_file(file) as partial:
+            save_database(database, partial)
             new = partial.with_name(final.name)
             _write(store, new, fingerprint=digest(partial))
-            stack.enter_context(folder_locked(final.parent))
+            stack.enter_context(place_locked(final))
             # Until the new database is in place, the old one may need a store that still waits.
-            _settle(Path(path))
-            move_folder(new, _waiting(final))
-        move_folder(_waiting(final), final)
+            _settle(file)
+            stack.callback(_remove_unneeded, file)
+            move_folder(new, waiting)
+        try:
+            move_folder(waiting, final)
+        except InputError as error:
+            if not _awaited(file):
+                raise
+            cause = error.__cause__
+            why = reason(cause) if isinstance(cause, OSError) else str(error)
+            raise InputError(
+                f"{file} is written, but its street objects are in {waiting}, because {final} "
+                f"could not be replaced ({why}); they are read there, and the next build or update "
+                "moves them."
+            ) from error
 
 
 def open_store(database: str | Path, folder: str | Path | None = None) -> ObjectStore:
@@ -476,7 +498,7 @@ def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
             "version": __version__,
             "database": fingerprint,
             "objects": len(store.objects),
-            "files": {file.name: digest(file) for file in sorted(partial.iterdir())},
+            "files": {file.name: digest(file) for file in sorted(partial.glob("*.parquet"))},
         }
         (partial / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
 
@@ -486,7 +508,7 @@ def current_store(database: Path) -> Path:
     final = store_path(database)
     if not _awaited(database):
         return final
-    with contextlib.suppress(InputError), folder_locked(final.parent) as alone:
+    with contextlib.suppress(InputError), place_locked(final) as alone:
         if alone:
             _settle(database)
     return _waiting(final) if _awaited(database) else final
@@ -497,6 +519,12 @@ def _settle(database: Path) -> None:
     if _awaited(database):
         final = store_path(database)
         move_folder(_waiting(final), final)
+
+
+def _remove_unneeded(database: Path) -> None:
+    """Remove the waiting store of a database that is not in place."""
+    if not _awaited(database):
+        shutil.rmtree(waiting_store(database), ignore_errors=True)
 
 
 def _awaited(database: Path) -> bool:

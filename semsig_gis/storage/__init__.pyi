@@ -46,9 +46,9 @@ from .toml import parse_toml as parse_toml
 from .toml import read_values as read_values
 from .toml import toml_text as toml_text
 from .whole import exchange as exchange
-from .whole import folder_locked as folder_locked
 from .whole import move_folder as move_folder
 from .whole import reason as reason
 from .whole import whole_file as whole_file
+from .whole import whole_files as whole_files
 from .whole import whole_folder as whole_folder
 from .whole import write_whole as write_whole

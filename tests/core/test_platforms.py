@@ -11,8 +11,8 @@ import filelock
 import pytest
 
 from semsig_gis import open_cache
-from semsig_gis.core import cores, free_address_space, temporary_folder
-from semsig_gis.storage import exchange, folder_locked
+from semsig_gis.core import cores, free_address_space, place_locked, temporary_folder
+from semsig_gis.storage import exchange
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -40,7 +40,7 @@ def test_without_locks_temporary_folders_are_created_and_removed(
     with temporary_folder(tmp_path) as first, temporary_folder(tmp_path) as second:
         assert {*tmp_path.iterdir()} == {first, second}
     assert list(tmp_path.iterdir()) == []
-    with folder_locked(tmp_path) as is_locked:
+    with place_locked(tmp_path / "city") as is_locked:
         assert not is_locked
 
 
@@ -51,7 +51,7 @@ def test_folder_that_cannot_be_opened_is_not_locked(
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(os, "open", refuse)
-    with folder_locked(tmp_path) as is_locked:
+    with place_locked(tmp_path / "city") as is_locked:
         assert not is_locked
 
 

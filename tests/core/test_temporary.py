@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -11,6 +17,7 @@ from semsig_gis.core import (
     LOCK_FILE,
     MACHINE_PREFIX,
     TEMPORARY_PREFIX,
+    place_locked,
     remove_abandoned,
     temporary,
     temporary_folder,
@@ -76,3 +83,49 @@ def test_folder_that_cannot_be_created_raises(tmp_path: Path, name: str) -> None
     remove_abandoned(tmp_path / name)
     with pytest.raises(OSError, match=name), temporary_folder(tmp_path / name):
         pytest.fail("the block must not run")
+
+
+def test_a_place_is_locked_for_one_writer_and_others_learn_for_whom_they_wait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(temporary, "PATIENCE_S", 0.1)
+    place, order = tmp_path / "city", list[int]()
+    ready, ended = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with place_locked(place) as alone:
+            order.append(alone)
+            ready.set()
+            ended.wait(10)
+            order.append(2)
+
+    holder = threading.Thread(target=hold)
+    holder.start()
+    ready.wait(10)
+    with place_locked(tmp_path / "another"):
+        remove_abandoned(tmp_path)  # not a folder of a process at work
+    threading.Timer(0.3, ended.set).start()
+    owner = rf"process {os.getpid()}, at work since .* {place}$"
+    with pytest.warns(UserWarning, match=owner), place_locked(place) as alone:
+        order.append(3 * alone)
+    holder.join()
+    assert order == [1, 2, 3]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="processes cannot be stopped")
+def test_a_stopped_owner_and_an_unknown_one_are_described(tmp_path: Path) -> None:
+    file = tmp_path / "owner"
+    assert temporary._owner(file) == "another program"
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+        file.write_text(f"{process.pid} 0")
+        assert f"process {process.pid}, at work since" in temporary._owner(file)
+        process.send_signal(signal.SIGSTOP)
+        try:
+            for _ in range(100):
+                if "stopped" in (text := temporary._owner(file)):
+                    break
+                time.sleep(0.01)
+            assert f"kill -CONT {process.pid}" in text
+        finally:
+            process.kill()

@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import shapely
+from late_failures import assert_true, failures
 from sentences import assert_sentence, refused
 from worlds import CORNER, assert_index_fits, assert_same, random_town, surroundings
 
@@ -38,6 +39,7 @@ from semsig_gis.database import (
 )
 from semsig_gis.database import store as store_module
 from semsig_gis.objects import ConflationReport, Loaded, LoadReport, open_objects
+from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -471,7 +473,7 @@ def test_a_waiting_store_is_moved_to_its_final_folder(
     waiting = stored.with_name("city.objects.next")
     store_path(stored).rename(waiting)
     with monkeypatch.context() as patch:  # no lock is available
-        patch.setattr(store_module, "folder_locked", lambda _: nullcontext(enter_result=False))
+        patch.setattr(store_module, "place_locked", lambda _: nullcontext(enter_result=False))
         assert_fits(open_store(stored), TOWN)
         assert City(stored).store_path == waiting
     with monkeypatch.context() as patch:
@@ -525,7 +527,8 @@ def test_a_full_disk_leaves_database_and_store_unchanged(
         raise OSError(28, "No space left on device")
 
     def full_partial(_: object, partial: Path) -> None:
-        raise InputError(f"{partial} could not be written (No space left on device); make room.")
+        with whole_file(partial):
+            full()
 
     for name, act, file in (
         ("save_objects", full, "city.objects"),
@@ -538,3 +541,22 @@ def test_a_full_disk_leaves_database_and_store_unchanged(
         assert_fits(open_store(stored), TOWN)
         assert_same(open_database(stored), build_database(TOWN))
         assert len(names_in(stored.parent)) == 2
+
+
+@pytest.mark.parametrize("calls", [1, 1000])
+def test_database_and_store_are_old_or_new_as_the_message_says(
+    calls: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, new = tmp_path / "city.parquet", fewer(7)
+    names = {"city.parquet", "city.objects"}
+    saved = build_database(new), ObjectStore.of(new)
+
+    def state() -> str:
+        count = len(open_store(path).objects)
+        assert len(open_database(path)) == len(build_database(new if count == len(new) else TOWN))
+        return "new" if count == len(new) else "old"
+
+    for run in failures(monkeypatch, exchange=True, calls=calls):
+        save(path, TOWN)
+        assert_true(run(lambda: save_with_store(*saved, path)), tmp_path, state, names=names)
+    assert state() == "new"
