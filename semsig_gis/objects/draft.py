@@ -210,6 +210,8 @@ def _crs(
         return (stated if sample.reader == VECTOR else None), ""
     if crs is not None:
         return crs, ""
+    if sample.reader != VECTOR and len(position) < 2:  # noqa: PLR2004 - not x and y
+        return None, ""  # degrees, by the rules of these formats
     # Read the coordinates in any CRS, to see whether they can be degrees.
     x, y = position if len(position) == 2 else (None, None)  # noqa: PLR2004 - x and y
     spec = LayerSpec(

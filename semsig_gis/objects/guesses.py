@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from shapely.geometry.base import BaseGeometry
 
-from semsig_gis.core import SourceError
+from semsig_gis.core import SourceError, crs_label
 from semsig_gis.sources import (
     FORMATS,
     LATITUDE_LIMIT,
@@ -100,7 +100,7 @@ def _table_sample(path: Path) -> LayerSample:
     info = LayerInfo(
         name=path.stem,
         geometry=" or ".join(sorted(shapes)) or "Point",
-        crs="EPSG:4326" if table.crs is None else table.crs.to_string(),
+        crs=None if table.crs is None else crs_label(table.crs.to_2d()),
         rows=len(rows) + sum(1 for _ in records),
         fields=tuple(table.fields),
     )

@@ -54,12 +54,17 @@ LATITUDE_LIMIT = 90.0 + 1e-6
 
 
 def parse_crs(text: AnyCrs) -> CRS:
-    """Parse the CRS that a user gives; CrsError if it is unknown, geocentric or vertical."""
+    """Parse the CRS that a user gives; CrsError if it is unknown, geocentric or vertical.
+
+    Of a compound CRS, only the horizontal part counts.
+    """
     advice = "write a code such as 'EPSG:2154' or 'EPSG:4326'"
     try:
         crs = CRS.from_user_input(text)
     except CRSError as error:
         raise CrsError(f"CRS {text!r} is unknown; {advice}.") from error
+    if crs.is_compound:
+        crs = crs.to_2d()
     if crs.is_geocentric or crs.is_vertical:
         kind = crs.type_name.removesuffix(" CRS").lower()
         raise CrsError(
@@ -73,6 +78,7 @@ def usable_crs(text: str) -> CRS | None:
     """Return the CRS that a file states, or None if it does not locate coordinates on the Earth.
 
     A CRS that is equal to an EPSG definition is replaced by it, to avoid a needless transformation.
+    Of a compound CRS, only the horizontal part counts.
     """
     if not text.strip():
         return None
@@ -80,6 +86,8 @@ def usable_crs(text: str) -> CRS | None:
         crs = CRS.from_user_input(text)
     except CRSError:
         return None
+    if crs.is_compound:
+        crs = crs.to_2d()
     geodetic = crs.geodetic_crs
     if geodetic is None or not (crs.is_geographic or crs.is_projected):
         return None  # an engineering CRS: a plane of its own

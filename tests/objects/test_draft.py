@@ -12,12 +12,14 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
+import numpy as np
 import pandas as pd
 import pyogrio
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pyproj import CRS
 from sentences import refused
 
 from semsig_gis.core import OWN_CODES, CrsError, SourceError
@@ -32,6 +34,9 @@ from semsig_gis.objects import (
     guess_position,
     read_files,
 )
+from semsig_gis.objects import (
+    load as load_objects,
+)
 from semsig_gis.sources import (
     Keywords,
     LayerInfo,
@@ -42,6 +47,7 @@ from semsig_gis.sources import (
     load_catalog,
     paper_taxonomy,
     reader,
+    transform_points,
     words_for,
     words_of,
 )
@@ -564,3 +570,34 @@ def test_position_fields_of_a_table_are_guessed(
 ) -> None:
     table = sample(*rows)
     assert guess_position(table, columns_of(table)) == expected
+
+
+CUSTOM_CRS = "+proj=laea +lat_0=43.6 +lon_0=3.88 +datum=WGS84 +units=m"
+
+
+@pytest.mark.parametrize(
+    ("suffix", "crs"),
+    [
+        (".gpkg", "EPSG:5698"),  # compound: with heights
+        (".gpkg", "EPSG:32631+5773"),
+        (".parquet", "EPSG:32631+5773"),
+        (".shp", "EPSG:4979"),
+        (".gpkg", "ESRI:102110"),
+        (".gpkg", "ESRI:54009"),
+        (".gpkg", CUSTOM_CRS),
+        (".parquet", CUSTOM_CRS),
+        (".gpkg", "OGC:CRS84"),
+    ],
+)
+def test_draft_of_a_file_in_any_crs_loads(suffix: str, crs: str, tmp_path: Path) -> None:
+    places = gpd.GeoSeries.from_xy([3.88, 3.881], [43.61, 43.611], crs="EPSG:4326")
+    places = places.to_crs(CRS(crs).to_2d()).set_crs(crs, allow_override=True)
+    frame = gpd.GeoDataFrame({"ref": ["a", "b"]}, geometry=places)
+    file = tmp_path / f"benches{suffix}"
+    frame.to_parquet(file) if suffix == ".parquet" else frame.to_file(file)
+    text = draft_catalog(file)
+    assert "$schema" not in text
+    (tmp_path / "draft.toml").write_text(text, encoding="utf-8")
+    objects = load_objects(file, catalog=tmp_path / "draft.toml").objects
+    lonlat = transform_points(objects.xy, objects.crs, CRS(4326))
+    assert np.allclose(lonlat, [[3.88, 43.61], [3.881, 43.611]], atol=1e-7)
