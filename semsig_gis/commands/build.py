@@ -287,14 +287,16 @@ class Build:
         return f"with the {' and '.join(defaults)} of {files}{effect} (--no-ground: without them)"
 
     def _summary(self, cells: int, entries: int, mode: str) -> Iterator[str]:
+        from semsig_gis.core import town_of
         from semsig_gis.database import PartitionedDatabase, landmark_costs, open_city
 
         where = {"all": "", "outdoor": " outside buildings", "streets": " along streets"}
         city = open_city(self.out)
         dataset = city.dataset
+        town = town_of(dataset.bounds.reshape(2, 2), dataset.crs)
         reach = dataset.taxonomy.ranges(self.radius).max()
         yield (
-            f"{cells:,} cells of {self.step:g} m{where[mode]} see "
+            f"{cells:,} cells of {self.step:g} m{where[mode]} {town} see "
             f"{entries / cells:.1f} street objects on average, up to {reach:,g} m away."
         )
         parts = dataset.parts() if isinstance(dataset, PartitionedDatabase) else [dataset]

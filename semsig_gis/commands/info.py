@@ -11,7 +11,7 @@ from typing_extensions import TypedDict
 from semsig_gis import database as databases
 from semsig_gis.commands.model import Reporter, Result, command
 from semsig_gis.commands.options import Database, Symbols, known_identifiability
-from semsig_gis.core import Table
+from semsig_gis.core import Table, Town
 
 if TYPE_CHECKING:
     from semsig_gis.database import City
@@ -68,6 +68,7 @@ class Properties(TypedDict):
     levels: int
     crs: str
     extent_degrees: list[float]
+    town: Town
     distortion: dict[str, Any]
     file_mb: float | None
     mb_per_km2: float | None

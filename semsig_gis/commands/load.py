@@ -11,7 +11,7 @@ from typing_extensions import TypedDict
 
 from semsig_gis import objects as street_objects
 from semsig_gis.commands.model import Option, Reporter, Result, command
-from semsig_gis.core import InputError, Table
+from semsig_gis.core import InputError, Table, Town
 
 
 def catalogs() -> tuple[str, ...]:
@@ -73,6 +73,7 @@ class Quality(TypedDict):
     crs: str
     extent: tuple[float, float, float, float]
     extent_degrees: tuple[float, float, float, float]
+    town: Town
     distortion: dict[str, Any]
     hull_km2: float
     occupied_km2: float

@@ -188,3 +188,4 @@ from .threads import each_in_order as each_in_order
 from .threads import share_rows as share_rows
 from .towns import Town as Town
 from .towns import nearest_town as nearest_town
+from .towns import town_of as town_of

@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.core.geometry import to_degrees
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from pyproj import CRS
 
 EARTH_RADIUS_KM = 6371.0088
 SAME_CITY_KM = 5.0
+NEAR_KM = 10.0  # from the middle of a town, without the distance in words
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +26,11 @@ class Town:
     name: str
     country: str
     distance_km: float
+
+    def __str__(self) -> str:
+        """Return ``near Lyon, France``, or from afar ``119 km from Hargeisa, Somalia``."""
+        distance = "near" if self.distance_km <= NEAR_KM else f"{self.distance_km:,.0f} km from"
+        return f"{distance} {self.name}, {self.country}"
 
 
 def nearest_town(lon: float, lat: float) -> Town:
@@ -51,6 +60,12 @@ def nearest_town(lon: float, lat: float) -> Town:
     # Districts of a city are towns, too; the first one is the largest.
     best = int(np.argmax(distances <= distances.min() + SAME_CITY_KM))
     return Town(*towns[best], float(distances[best]))
+
+
+def town_of(xy: NDArray[np.float64], crs: CRS) -> Town:
+    """Return the nearest town of the middle of at least one place in a CRS, shape (n, 2)."""
+    x, y = np.median(xy, axis=0)
+    return nearest_town(*to_degrees(crs).transform(x, y))
 
 
 @functools.cache

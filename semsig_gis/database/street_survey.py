@@ -10,7 +10,16 @@ import lazy_loader
 import numpy as np
 from typing_extensions import TypedDict
 
-from semsig_gis.core import FAMILIES, SOURCE, EmptyResultError, GridSpec, ObjectIndex, consecutive
+from semsig_gis.core import (
+    FAMILIES,
+    SOURCE,
+    EmptyResultError,
+    GridSpec,
+    ObjectIndex,
+    Town,
+    consecutive,
+    town_of,
+)
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.sightings import visible_objects_at
 from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints, reproject
@@ -59,6 +68,7 @@ class SurveyRecord(TypedDict):
     occlusion: bool
     street_km: float
     radius: float
+    town: Town
     families: list[FamilyRecord]
 
 
@@ -88,7 +98,7 @@ class Survey:
     `places` is the number of places that were looked at, every 10 m along `street_km` of streets,
     or outdoors if there are no streets. With `occlusion`, buildings hide what is behind them. The
     first of `families` is street furniture, also if there is none; those of optional layers are
-    the last.
+    the last. `town` is the nearest one of the middle of all objects.
     """
 
     places: int
@@ -96,6 +106,7 @@ class Survey:
     occlusion: bool
     street_km: float
     radius: float
+    town: Town
     families: tuple[FamilySurvey, ...]
 
     @property
@@ -121,6 +132,7 @@ class Survey:
             "occlusion": self.occlusion,
             "street_km": self.street_km,
             "radius": self.radius,
+            "town": self.town,
             "families": families,
         }
 
@@ -222,6 +234,7 @@ def survey(
         occlusion=buildings is not None,
         street_km=km,
         radius=radius,
+        town=town_of(objects.xy, objects.crs),
         families=tuple(families),
     )
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core import degree_bounds, plane_distortion
+from semsig_gis.core import degree_bounds, plane_distortion, town_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -40,10 +41,10 @@ def database_summary(
     dict
         ``signatures``, ``mean_length``, ``covered_km2``, ``radius_m``, ``step_m``,
         ``levels``, ``crs``, ``extent_degrees`` (west, south, east and north of the
-        viewpoints), ``distortion`` (of the plane, see `Distortion.to_dict`), ``file_mb`` and
-        ``mb_per_km2`` (millions of bytes or None), ``version``, ``licenses``, ``notes``
-        (warnings about its data); ``viewpoints``: ``mode``, ``half_width_m`` (of streets,
-        else None) and ``area_km2`` (of the chosen area, or None); ``occlusion_m``: the
+        viewpoints), ``town`` (see `Town`), ``distortion`` (of the plane, see
+        `Distortion.to_dict`), ``file_mb`` and ``mb_per_km2`` (millions of bytes or None),
+        ``version``, ``licenses``, ``notes`` (warnings about its data); ``viewpoints``: ``mode``,
+        ``half_width_m`` (of streets, else None) and ``area_km2`` (of the chosen area, or None); ``occlusion_m``: the
         tolerance, or None without buildings; ``occurrences``: one dict per class (``code``,
         ``symbol``, ``name``, ``title``, ``family``, ``range_m``, ``number``, ``share``,
         ``objects``: its count or None, ``objects_per_km2``, ``entropy_bits``); ``density_from``:
@@ -91,6 +92,7 @@ def database_summary(
         "levels": int(database.spec.levels),
         "crs": database.crs.to_string(),
         "extent_degrees": list(degree_bounds(database.crs, extent)),
+        "town": asdict(town_of(database.xy, database.crs)),
         "distortion": plane_distortion(database.crs, extent).to_dict(),
         "file_mb": None if file_bytes is None else file_bytes / 1e6,
         "mb_per_km2": None if file_bytes is None else file_bytes / 1e6 / covered,

@@ -25,6 +25,7 @@ from semsig_gis.core import (
     crs_label,
     degree_bounds,
     plane_distortion,
+    town_of,
 )
 from semsig_gis.storage import whole_numbers
 
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core import Distortion, ObjectClass
+    from semsig_gis.core import Distortion, ObjectClass, Town
     from semsig_gis.objects.conflation import ConflatedPair, ConflationReport
     from semsig_gis.objects.layers import LayerReport, LoadReport, UnreadLayer
     from semsig_gis.objects.table import StreetObjects
@@ -80,11 +81,11 @@ class QualityReport(Displayed):
     `classes` are the classes with objects in the order of the taxonomy, `absent` the classes of the
     loaded layers without objects; classes only in `unread` layers are in neither. `sources` are in
     the order of loading. `crs` is a code, or else a name. Extents are west, south, east and north,
-    in metres and in degrees of WGS 84. `hull_km2` is the area of the convex hull of all objects,
-    `occupied_km2` the area of the squares of 100 m that contain an object. `fronts` objects were
-    moved to the fronts of their buildings, `derived` objects were computed from streets and
-    buildings, and `texts` are the columns of what is written on objects. `notes` are warnings about
-    the whole load; warnings about a layer are in `sources`.
+    in metres and in degrees of WGS 84; `town` is the nearest one of the middle of all objects.
+    `hull_km2` is the area of their convex hull, `occupied_km2` the area of the squares of 100 m
+    that contain an object. `fronts` objects were moved to the fronts of their buildings, `derived`
+    objects were computed from streets and buildings, and `texts` are the columns of what is written
+    on objects. `notes` are warnings about the whole load; warnings about a layer are in `sources`.
     """
 
     classes: tuple[ClassQuality, ...]
@@ -94,6 +95,7 @@ class QualityReport(Displayed):
     crs: str
     extent: tuple[float, float, float, float]
     extent_degrees: tuple[float, float, float, float]
+    town: Town
     distortion: Distortion
     hull_km2: float
     occupied_km2: float
@@ -190,6 +192,7 @@ def quality_report(
         crs=crs_label(objects.crs),
         extent=(west, south, east, north),
         extent_degrees=degree_bounds(objects.crs, (west, south, east, north)),
+        town=town_of(xy, objects.crs),
         distortion=plane_distortion(objects.crs, (west, south, east, north)),
         hull_km2=hull_km2,
         occupied_km2=occupied_km2,

@@ -109,7 +109,7 @@ def test_without_streets_places_are_outdoors() -> None:
     assert (furniture.objects, furniture.per_km, worship.per_km) == (0, None, None)
     assert 0.9 * 144 < result.places < 169
     sentence = survey_sentence(result)
-    assert sentence.startswith(f"60 objects. Of {result.places} places outdoors, ")
+    assert sentence.startswith(f"60 objects {result.town}. Of {result.places} places outdoors, ")
     first, _, last = survey_tables(result)
     assert [row[0] for row in first.rows] == ["Street furniture", "+ Places of worship"]
     assert last.rows[0] == ("Street furniture", "0", "0", "")

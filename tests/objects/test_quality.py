@@ -94,6 +94,9 @@ def test_report_equals_the_snapshot(snapshot: Callable[[str, str], None]) -> Non
     assert 3.86 < west < east < 3.88
     assert 43.60 < south < north < 43.62
     assert plain.pop("distortion")["angle"] == pytest.approx(0.63, abs=0.01)
+    town = plain.pop("town")
+    assert (town["name"], town["country"]) == ("Montpellier", "France")
+    assert town["distance_km"] < 5.0
     snapshot("quality.json", json.dumps(plain, indent=1) + "\n")
 
 

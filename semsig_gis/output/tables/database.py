@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import Table, family_named, percent
+from semsig_gis.core import Table, Town, family_named, percent
 from semsig_gis.database import database_summary
 from semsig_gis.evaluation import published as paris
 from semsig_gis.output.tables.tables import distortion_rows, note_tables
@@ -52,8 +52,8 @@ def database_sentences(facts: Mapping[str, Any], *, symbols: bool = False) -> li
     """
     ranges = (item["range_m"] for item in facts["occurrences"] if item["number"])
     size = (
-        f"{facts['signatures']:,} cells of {facts['step_m']:g} m see {facts['mean_length']:.1f} "
-        f"street objects on average, up to {max(ranges):,g} m away; "
+        f"{facts['signatures']:,} cells of {facts['step_m']:g} m {Town(**facts['town'])} see "
+        f"{facts['mean_length']:.1f} street objects on average, up to {max(ranges):,g} m away; "
         f"{percent(facts['groups']['type']['unique'], 0)} of them see classes in an order that no "
         "other cell sees."
     )
@@ -134,6 +134,7 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
             ("Viewpoints", _viewpoint_text(facts["viewpoints"]), ""),
             ("Grid step", f"{facts['step_m']:g} m", "10 m"),
             ("Angle levels", str(facts["levels"]), "16"),
+            ("Where", str(Town(**facts["town"])), ""),
             ("Coordinate system", facts["crs"], ""),
             (
                 "West, south, east, north",

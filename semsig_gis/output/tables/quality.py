@@ -92,6 +92,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
             "Place",
             ("what", "value"),
             (
+                ("where", str(report.town)),
                 ("coordinate system", report.crs),
                 (f"{sides}, m", ", ".join(f"{edge:.0f}" for edge in report.extent)),
                 (f"{sides}, degrees", ", ".join(f"{edge:.5f}" for edge in report.extent_degrees)),
@@ -199,7 +200,7 @@ def quality_sentence(report: QualityReport) -> str:
     more = f" and {rest:,} more class{'es' if rest > 1 else ''}" if rest else ""
     return (
         f"{_many(report.objects, 'street object')} of {_many(len(report.classes), 'class', 'es')} "
-        f"on {report.hull_km2:,.2f} km²: {names}{more}.{_origins(report)}"
+        f"on {report.hull_km2:,.2f} km² {report.town}: {names}{more}.{_origins(report)}"
     )
 
 

@@ -28,6 +28,7 @@ def survey_sentence(survey: Survey) -> str:
 
     Examples
     --------
+    >>> from semsig_gis.core import Town
     >>> from semsig_gis.database import FamilySurvey, Survey
     >>> trees = FamilySurvey(
     ...     family="furniture",
@@ -43,17 +44,18 @@ def survey_sentence(survey: Survey) -> str:
     ...     occlusion=False,
     ...     street_km=2.0,
     ...     radius=30.0,
+    ...     town=Town("Lyon", "France", 2.1),
     ...     families=(trees,),
     ... )
     >>> survey_sentence(result)  # doctest: +NORMALIZE_WHITESPACE
-    '20 objects along 2.0 km of street. Of 200 places there, 50 % see none of them, and 25 % see
-    five or more.'
+    '20 objects along 2.0 km of street near Lyon, France. Of 200 places there, 50 % see none of
+    them, and 25 % see five or more.'
     """
     where = f" along {survey.street_km:,.1f} km of street" if survey.along_streets else ""
     some = "there" if survey.along_streets else "outdoors"
     none, _, *many = survey.seen
     return (
-        f"{survey.objects:,} objects{where}. Of {survey.places:,} places {some}, "
+        f"{survey.objects:,} objects{where} {survey.town}. Of {survey.places:,} places {some}, "
         f"{percent(none, 0)} see none of them, and {percent(sum(many), 0)} see five or more."
     )
 

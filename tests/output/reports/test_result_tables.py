@@ -14,7 +14,7 @@ from noisy_cells import random_database, rows, six_cells
 from small_city import chances_of
 from worlds import random_town
 
-from semsig_gis.core import Distortion, wilson_interval
+from semsig_gis.core import Distortion, Town, wilson_interval
 from semsig_gis.database import UpdateReport, ViewpointSpec
 from semsig_gis.evaluation import (
     ChanceBin,
@@ -139,6 +139,7 @@ LOAD = QualityReport(
     crs="EPSG:2154",
     extent=(770000.4, 6280000.0, 771000.0, 6281000.0),
     extent_degrees=(3.87, 43.6, 3.88, 43.61),
+    town=Town("Montpellier", "France", 0.5),
     distortion=Distortion(convergence=(0.62, 0.64), scale=(0.9999, 1.0)),
     hull_km2=0.5,
     occupied_km2=20.0,
