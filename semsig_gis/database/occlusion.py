@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import geopandas as gpd
     import shapely
     from numpy.typing import ArrayLike, NDArray
+
+    from semsig_gis.database.sight_lines import WallGrid
 else:
     shapely = lazy_loader.load("shapely")
 
@@ -100,7 +102,8 @@ class Footprints(Displayed):
         """
         both = copy.copy(self)
         start = len(self.interiors)
-        vars(both).pop("_tree", None)
+        for name in ("_tree", "walls", "interior_tree"):
+            vars(both).pop(name, None)
         vars(both).update(
             repaired=self.repaired + other.repaired,
             interiors=np.concatenate([self.interiors, other.interiors]),
@@ -132,6 +135,22 @@ class Footprints(Displayed):
         blocks = np.asarray(shapely.multipolygons(self._widened[order], indices=number))
         outlines = shapely.union_all(blocks[:, None], axis=1)
         return _polygons_of(np.asarray(shapely.buffer(outlines, -GAP_M - self.tolerance)))
+
+    @functools.cached_property
+    def walls(self) -> WallGrid | None:
+        """The walls of the interiors; None if there are none."""
+        from semsig_gis.database.sight_lines import wall_grid  # noqa: PLC0415 - numba, 0.2 s
+
+        rings, row = shapely.get_rings(self.interiors, return_index=True)
+        xy, ring = shapely.get_coordinates(rings, return_index=True)
+        joined = ring[1:] == ring[:-1]
+        ends = np.stack([xy[:-1], xy[1:]], axis=1)[joined]
+        return wall_grid(ends, row[ring[1:][joined]].astype(np.int32)) if len(ends) else None
+
+    @functools.cached_property
+    def interior_tree(self) -> shapely.STRtree:
+        """The interiors in an R-tree."""
+        return shapely.STRtree(self.interiors)
 
     @functools.cached_property
     def _widened(self) -> NDArray[np.object_]:
@@ -175,33 +194,49 @@ def hidden(
     """
     starts = np.asarray(viewpoints, dtype=np.float64).reshape(-1, 2)
     ends = np.asarray(objects, dtype=np.float64).reshape(-1, 2)
+    from semsig_gis.database.sight_lines import (  # noqa: PLC0415 - numba, 0.2 s
+        BLOCKED,
+        UNSURE,
+        cross_walls,
+    )
+
+    walls = footprints.walls
+    if walls is None or not len(starts):
+        return np.zeros(len(starts), bool)
+    # The pairs of one viewpoint follow each other, and the building around it is found once.
+    first = np.ones(len(starts), bool)
+    first[1:] = (starts[1:] != starts[:-1]).any(axis=1)
+    places = np.asarray(shapely.points(starts[first]))
+    row, place = shapely.STRtree(places).query(footprints.interiors, predicate="intersects")
+    around = np.full(len(places), -1, np.int32)
+    around[place] = row
+    around = around[np.cumsum(first) - 1]
+    states = cross_walls(starts, ends, around, grid=walls)
+    blocked: NDArray[np.bool_] = states == BLOCKED
+    rest = np.flatnonzero(~blocked & ((states == UNSURE) | (around >= 0)))
+    for low in range(0, len(rest), PAIRS_PER_BLOCK):  # to bound the memory
+        part = rest[low : low + PAIRS_PER_BLOCK]
+        blocked[part] = _hidden_exactly(starts[part], ends[part], footprints)
+    return blocked
+
+
+def _hidden_exactly(
+    starts: NDArray[np.float64], ends: NDArray[np.float64], footprints: Footprints
+) -> NDArray[np.bool_]:
+    """Return the result of `hidden`, by shapely for every line."""
     blocked = np.zeros(len(starts), bool)
-    west, south, east, north = shapely.bounds(footprints.interiors).reshape(-1, 4).T
-    for first in range(0, len(starts), PAIRS_PER_BLOCK):  # to bound the memory
-        part = slice(first, first + PAIRS_PER_BLOCK)
-        low = np.minimum(starts[part], ends[part]).min(axis=0)
-        high = np.maximum(starts[part], ends[part]).max(axis=0)
-        # Interiors in the box of these sight lines.
-        here = np.flatnonzero(
-            (east >= low[0]) & (west <= high[0]) & (north >= low[1]) & (south <= high[1])
-        )
-        interiors = footprints.interiors[here]
-        pair = first + _pairs_near(starts[part], ends[part], interiors)
-        lines = np.asarray(shapely.linestrings(np.stack([starts[pair], ends[pair]], axis=1)))
-        # Interiors that a line meets hide its object, unless they contain the viewpoint. The lines
-        # are in the tree, so that shapely prepares the interiors.
-        hit, line = shapely.STRtree(lines).query(interiors, predicate="intersects")
-        x, y = starts[pair[line]].T
-        within = shapely.intersects_xy(interiors[hit], x, y)
-        blocked[pair[line[~within]]] = True
-        # From inside a block of houses, the house around the viewpoint does not hide; others do.
-        inside = np.unique(line[within])
-        if len(inside):
-            cores = np.concatenate([footprints.cores(row) for row in here[np.unique(hit[within])]])
-            core, line = shapely.STRtree(lines[inside]).query(cores, predicate="intersects")
-            x, y = starts[pair[inside[line]]].T
-            within = shapely.intersects_xy(cores[core], x, y)
-            blocked[pair[inside[line[~within]]]] = True
+    lines = np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
+    # Interiors that a line meets hide its object, unless they contain the viewpoint.
+    line, hit = footprints.interior_tree.query(lines, predicate="intersects")
+    within = shapely.intersects_xy(footprints.interiors[hit], *starts[line].T)
+    blocked[line[~within]] = True
+    # From inside a block of houses, the house around the viewpoint does not hide; others do.
+    inside = np.unique(line[within])
+    if len(inside):
+        cores = np.concatenate([footprints.cores(row) for row in np.unique(hit[within])])
+        core, line = shapely.STRtree(lines[inside]).query(cores, predicate="intersects")
+        within = shapely.intersects_xy(cores[core], *starts[inside[line]].T)
+        blocked[inside[line[~within]]] = True
     return blocked
 
 
@@ -294,23 +329,6 @@ def building_heights(buildings: gpd.GeoDataFrame) -> NDArray[np.float64] | None:
     if HEIGHT not in buildings:
         return None
     return heights_in(buildings[HEIGHT].to_numpy()).astype(np.float32).astype(np.float64)
-
-
-def _pairs_near(
-    starts: NDArray[np.float64], ends: NDArray[np.float64], interiors: NDArray[np.object_]
-) -> NDArray[np.int64]:
-    """Return the pairs with an interior within the longest distance of their viewpoint.
-
-    Only these need a line. The pairs of one viewpoint follow each other, and it is tested once.
-    """
-    first = np.ones(len(starts), bool)
-    first[1:] = (starts[1:] != starts[:-1]).any(axis=1)
-    reach = np.hypot(*(ends - starts).T).max()
-    places = shapely.STRtree(np.asarray(shapely.points(starts[first])))
-    near = np.zeros(int(first.sum()), bool)
-    around = shapely.bounds(interiors) + np.array([-1, -1, 1, 1]) * (reach + 1.0)
-    near[places.query(np.asarray(shapely.box(*around.T)))[1]] = True
-    return np.flatnonzero(near[np.cumsum(first) - 1])
 
 
 def _usable(

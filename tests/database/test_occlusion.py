@@ -170,12 +170,32 @@ def test_connected_nodes_have_one_label(edges: list[tuple[int, int]]) -> None:
 
 
 @settings(max_examples=25)
-@given(st.integers(0, 2**32 - 1))
-def test_occlusion_in_random_towns_equals_the_oracle(seed: int) -> None:
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    span=st.sampled_from([60.0, 3_000.0]),
+    origin=st.sampled_from([0.0, -500.0, 6_700_000.0]),
+)
+def test_occlusion_in_random_towns_equals_the_oracle(seed: int, span: float, origin: float) -> None:
     rng = np.random.default_rng(seed)
-    corners, sizes = rng.uniform(0, 60, (12, 2)), rng.uniform(0.3, 20, (12, 2))
+    corners = origin + rng.uniform(0, span, (12, 2))
+    sizes = rng.uniform(0.3, rng.choice([20.0, 200.0]), (12, 2))
     polygons = np.asarray(shapely.box(*corners.T, *(corners + sizes).T))
     check_against_oracle(polygons, 40, rng)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_occlusion_along_walls_and_through_corners_equals_the_oracle(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    corners, sizes = rng.integers(0, 12, (4, 2)), rng.integers(2, 8, (4, 2))
+    polygons = np.asarray(shapely.box(*corners.T, *(corners + sizes).T), dtype=object)
+    footprints = Footprints(polygons)
+    # The ends are corners of the cut-back buildings and whole metres between them.
+    places = np.concatenate(
+        [shapely.get_coordinates(footprints.interiors), rng.integers(0, 20, (40, 2)) + 0.55]
+    )
+    starts, ends = (places[rng.integers(0, len(places), 100)] for _ in range(2))
+    exact = occlusion._hidden_exactly(starts, ends, footprints)
+    assert hidden(starts, ends, footprints=footprints).tolist() == exact.tolist()
 
 
 def test_occlusion_in_helsinki_equals_the_oracle(geodata: Path) -> None:
