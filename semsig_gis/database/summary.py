@@ -44,8 +44,8 @@ def database_summary(
         viewpoints), ``town`` (see `Town`), ``distortion`` (of the plane, see
         `Distortion.to_dict`), ``file_mb`` and ``mb_per_km2`` (millions of bytes or None),
         ``version``, ``licenses``, ``notes`` (warnings about its data); ``viewpoints``: ``mode``,
-        ``half_width_m`` (of streets, else None) and ``area_km2`` (of the chosen area, or None); ``occlusion_m``: the
-        tolerance, or None without buildings; ``occurrences``: one dict per class (``code``,
+        ``half_width_m`` (of streets, else None) and ``area_km2`` (of the chosen area,
+        or None); ``occlusion_m``: the tolerance, or None without buildings; ``occurrences``: one dict per class (``code``,
         ``symbol``, ``name``, ``title``, ``family``, ``range_m``, ``number``, ``share``,
         ``objects``: its count or None, ``objects_per_km2``, ``entropy_bits``); ``density_from``:
         ``"objects"`` or ``"occurrences"``; ``cell_bits``; ``groups``: for ``type``,
