@@ -90,6 +90,7 @@ from .parquet import SUFFIXES as SUFFIXES
 from .parquet import read_parquet as read_parquet
 from .paths import FILE_SUFFIXES as FILE_SUFFIXES
 from .paths import files_in as files_in
+from .paths import is_geodatabase as is_geodatabase
 from .paths import require_file as require_file
 from .probe import probe_file as probe_file
 from .readers.mapillary import MOST_FEATURES as MOST_FEATURES
@@ -124,11 +125,11 @@ from .synthetic.streets import Network as Network
 from .vector.by_fiona import read_each as read_each
 from .vector.by_pyogrio import describe as describe
 from .vector.by_pyogrio import read_whole as read_whole
+from .vector.contents import members as members
 from .vector.file import LayerInfo as LayerInfo
 from .vector.file import first_rows as first_rows
 from .vector.file import list_layers as list_layers
 from .vector.file import read_layer as read_layer
-from .vector.member import DRIVERS as DRIVERS
+from .vector.formats import DRIVERS as DRIVERS
 from .vector.member import LayerDescription as LayerDescription
 from .vector.member import Member as Member
-from .vector.member import members as members

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from semsig_gis.core import InputError
 from semsig_gis.sources.files import file_reader
-from semsig_gis.sources.paths import files_in, require_file
+from semsig_gis.sources.paths import files_in, is_folder, require_file
 from semsig_gis.sources.probe import probe_file
 from semsig_gis.storage import file_kind
 
@@ -41,9 +41,9 @@ def detect_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple
     names: list[str] = []
     lines: list[str] = []
     for path in map(Path, paths):
-        if not path.is_dir():
+        if not is_folder(path):
             require_file(path, "a file or a folder of files")
-        files = files_in(path) if path.is_dir() else [path]
+        files = files_in(path) if is_folder(path) else [path]
         for file in files or [path]:
             reader = file_reader(file, sure=True) if files else None
             if reader is None and any(map(OVERTURE_COLUMNS.issubset, probe_file(file).columns)):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources.osm import features
-from semsig_gis.sources.paths import files_in, matches_pattern
+from semsig_gis.sources.paths import files_in, is_folder, matches_pattern
 from semsig_gis.sources.probe import probe_file
 from semsig_gis.sources.registry import READERS
 
@@ -108,14 +108,14 @@ def _group_paths(
     for path in dict.fromkeys(Path(item) for item in paths):
         if not path.exists():
             raise SourceError(f"{path} does not exist; give a file or a folder of files.")
-        inside = files_in(path) if path.is_dir() else [path]
+        inside = files_in(path) if is_folder(path) else [path]
         if any(matches_pattern(file.name, spec.files) for file in inside for spec in specs):
-            (in_folders if path.is_dir() else files).extend(inside)
+            (in_folders if is_folder(path) else files).extend(inside)
             continue
         with_tags = []
         # Only layers that are selected by tags may be in a file of any name.
         for file in inside if by_tags else ():
-            with contextlib.suppress(*([SourceError] if path.is_dir() else [])):
+            with contextlib.suppress(*([SourceError] if is_folder(path) else [])):
                 with_tags += [] if file_reader(file) is None else [file]
         if not with_tags:
             patterns: dict[tuple[str, ...], list[str]] = {}
@@ -126,7 +126,7 @@ def _group_paths(
                 f"({', '.join(names_of_files)})"
                 for names_of_files, names in patterns.items()
             )
-            verb = "contains no file of" if path.is_dir() else "is not the file of"
+            verb = "contains no file of" if is_folder(path) else "is not the file of"
             more = ", or any vector file with columns of OpenStreetMap's tags" if by_tags else ""
             raise SourceError(
                 f"{path} {verb} any layer; the layers and their files are {layers}{more}."

@@ -15,8 +15,34 @@ if TYPE_CHECKING:
 # Other files (.dbf, .prj, a README) only accompany data.
 FILE_SUFFIXES = frozenset(
     {".bz2", ".csv", ".fgb", ".geojson", ".geoparquet", ".gml", ".gpkg", ".gz", ".json",
-     ".osm", ".parquet", ".pbf", ".shp", ".zip"}
+     ".osm", ".parquet", ".pbf", ".shp", ".zip",
+     ".dxf", ".gdb", ".geojsonl", ".geojsons", ".geojsonseq", ".gpx", ".jsonl", ".kml", ".kmz",
+     ".mif", ".ndjson", ".ods", ".sqlite", ".tab", ".topojson", ".tsv", ".umap", ".xlsx"}
 )  # fmt: skip
+# A shapefile consists of several files, and each may be replaced.
+SHAPEFILE_PARTS = (".shp", ".shx", ".dbf", ".prj", ".cpg")
+
+
+def is_geodatabase(path: Path) -> bool:
+    """Whether a path is a file geodatabase, a folder that is one data file."""
+    return path.suffix.lower() == ".gdb" and path.is_dir()
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a path is a folder of files."""
+    return path.is_dir() and not is_geodatabase(path)
+
+
+def file_stamp(path: Path) -> tuple[tuple[int, int, int], ...]:
+    """Return what changes with a file, or with a file in a geodatabase; empty if it is absent."""
+    if is_geodatabase(path):
+        parts = sorted(path.iterdir())
+    elif path.suffix.lower() == ".shp":
+        parts = [path.with_suffix(suffix) for suffix in SHAPEFILE_PARTS]
+    else:
+        parts = [path]
+    states = (part.stat() for part in parts if part.is_file())
+    return tuple((state.st_mtime_ns, state.st_size, state.st_ino) for state in states)
 
 
 def require_file(path: Path, kind: str) -> None:

@@ -7,18 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from semsig_gis.sources import parquet, vector
-from semsig_gis.sources.vector.member import DRIVERS
+from semsig_gis.sources.paths import file_stamp
+from semsig_gis.sources.vector.formats import ARCHIVES, CSV, DRIVERS, WORKBOOKS
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.sources.vector.member import LayerDescription, Member
 
-VECTOR_SUFFIXES = frozenset({*DRIVERS, ".zip"} - {".csv"})
+VECTOR_SUFFIXES = ARCHIVES | {
+    suffix for suffix, driver in DRIVERS.items() if driver not in {CSV, *WORKBOOKS}
+}
 # An answer of Overpass is JSON, too, and has its key "elements" near the beginning.
 OVERPASS_START_BYTES = 4096
-# A shapefile consists of several files, and each may be replaced.
-SHAPEFILE_PARTS = (".shp", ".shx", ".dbf", ".prj", ".cpg")
 MOST_PROBES = 256
 
 
@@ -39,11 +40,7 @@ def probe_file(path: Path) -> FileProbe:
 
     SourceError if the file is damaged.
     """
-    suffix = path.suffix.lower()
-    names = SHAPEFILE_PARTS if suffix == ".shp" else (path.suffix,)
-    states = (part.stat() for name in names if (part := path.with_suffix(name)).is_file())
-    stamp = tuple((state.st_mtime_ns, state.st_size, state.st_ino) for state in states)
-    return _probe(path, suffix, stamp)
+    return _probe(path, path.suffix.lower(), file_stamp(path))
 
 
 @functools.lru_cache(maxsize=MOST_PROBES)

@@ -419,7 +419,7 @@ WRONG_FILES: list[tuple[str, str, bytes, str]] = [
     ("opendatasoft", "a.gpkg", b"SQLite", "a.gpkg"),
     ("opendatasoft", "a.parquet", b"PAR1" + bytes(100), "whole Parquet"),
     ("opendatasoft", "a.parquet", b"PAR1", "whole Parquet"),
-    ("wfs", "a.gml", b"<!DOCTYPE html><html/>", "document type"),
+    ("wfs", "a.gml", b"<!DOCTYPE html><html/>", "web page"),
     ("wfs", "a.gml", b"<kml/>", "has no features"),
     ("wfs", "a.gml", REPORT, "contains the error No"),
 ]  # fmt: skip

@@ -595,7 +595,7 @@ def test_archive_with_folders_and_companions(tmp_path: Path) -> None:
 
 
 def test_path_that_is_not_a_vector_file_is_refused(tmp_path: Path) -> None:
-    text = text_file(tmp_path, "readme.txt", "x,y\n1,2\n")
+    text = text_file(tmp_path, "readme.md", "x,y\n1,2\n")
     empty = tmp_path / "empty.gpkg"
     frame([(1, 2)], n=[1]).to_file(empty, SPATIAL_INDEX="NO")
     with contextlib.closing(sqlite3.connect(empty)) as container:
@@ -603,8 +603,8 @@ def test_path_that_is_not_a_vector_file_is_refused(tmp_path: Path) -> None:
             "DELETE FROM gpkg_contents; DELETE FROM gpkg_geometry_columns; DROP TABLE empty;"
         )
     for path, words in (
-        (text, "readme.txt is not a vector file; give one of .csv"),
-        (pack(tmp_path / "a.zip", text), "contains no vector file, only readme.txt; one of .csv"),
+        (text, "readme.md is not a vector file; give one of .csv"),
+        (pack(tmp_path / "a.zip", text), "contains no vector file, only readme.md; one of .csv"),
         (pack(tmp_path / "b.zip"), "only nothing"),
         (empty, "empty.gpkg"),
     ):

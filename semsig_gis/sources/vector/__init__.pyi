@@ -5,6 +5,6 @@ from .file import read_layer as read_layer
 from .file import read_layers as read_layers
 from .file import read_tables as read_tables
 from .file import spatial_layers as spatial_layers
-from .member import DRIVERS as DRIVERS
+from .formats import DRIVERS as DRIVERS
 from .member import LayerDescription as LayerDescription
 from .member import Member as Member

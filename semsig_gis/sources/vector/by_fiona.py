@@ -17,7 +17,8 @@ import shapely
 import shapely.geometry
 
 from semsig_gis.sources.rows import BadFeatureError, Rows
-from semsig_gis.sources.vector.member import GEOJSON, NOT_UTF8, OUT_OF_REACH, unreadable
+from semsig_gis.sources.vector.formats import GEOJSON
+from semsig_gis.sources.vector.member import NOT_UTF8, OUT_OF_REACH, unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -51,7 +52,7 @@ for _name in LOGGERS:
 
 def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, tuple[str, ...]]:
     """Return the rows of a layer of `count` rows with errors of bad rows, and notes."""
-    options: dict[str, Any] = {"enabled_drivers": [member.driver]}
+    options: dict[str, Any] = {"enabled_drivers": [member.driver], "encoding": member.encoding}
     if member.driver != GEOJSON:  # its driver cannot select fields
         options["include_fields"] = list(fields)
     records: list[logging.LogRecord] = []

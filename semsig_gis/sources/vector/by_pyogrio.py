@@ -20,15 +20,12 @@ from pyogrio.raw import open_arrow, read
 from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.rows import Rows, plain, usable_crs
+from semsig_gis.sources.vector.formats import DXF, GEOJSON, GEOPACKAGE, GPX, SHAPEFILE
 from semsig_gis.sources.vector.geojson import parse_geojson
 from semsig_gis.sources.vector.member import (
-    CONTAINER,
-    GEOJSON,
     NOT_UTF8,
     OUT_OF_REACH,
-    SHAPEFILE,
     LayerDescription,
-    not_of_its_kind,
     unreadable,
 )
 
@@ -50,9 +47,17 @@ LATIN = "ISO-8859-1"
 # After this number of failures in succession, the reader does not advance any more. Each attempt
 # opens the file again.
 MOST_FAILURES = 20
+# Layers without objects: the strokes of symbols, and ways that somebody has gone or will go.
+NO_DATA = {
+    DXF: {"blocks"},
+    GPX: {"routes", "tracks", "route_points", "track_points"},
+}
 CRS_SEARCH = "USE_OSR_FIND_MATCHES"
 # GDAL's faster reader of FlatGeobuf returns random offsets for missing geometries.
-pyogrio.set_gdal_config_options({"OGR_FLATGEOBUF_STREAM_BASE_IMPL": True})
+# The place of a symbol in a drawing is its point of insertion, not the middle of its strokes.
+pyogrio.set_gdal_config_options(
+    {"OGR_FLATGEOBUF_STREAM_BASE_IMPL": True, "DXF_INLINE_BLOCKS": False}
+)
 
 
 _lock = threading.RLock()
@@ -88,7 +93,9 @@ def describe(member: Member, *, bounds: bool = False) -> LayerDescription:
             return geojson
     info = _info(member)
     if info["driver"] != member.driver:
-        raise not_of_its_kind(member)
+        raise SourceError(
+            f"{member} is not the kind of file that its name says; download it again."
+        )
     text = info["crs"] or ""
     if member.driver == SHAPEFILE and text:
         if text not in _matches:
@@ -115,6 +122,7 @@ def _info(member: Member, *, crs: bool = False) -> dict[str, Any]:
             info: dict[str, Any] = pyogrio.read_info(
                 member.address,
                 layer=member.layer,
+                encoding=member.encoding,
                 force_feature_count=True,
                 force_total_bounds=member.driver == GEOJSON,
             )
@@ -133,7 +141,7 @@ def layer_names(member: Member) -> list[str]:
         raise unreadable(member, error) from error
     if not names:
         raise SourceError(f"{member} contains no layer; download it again.")
-    return names
+    return [name for name in names if name not in NO_DATA.get(member.driver, ())]
 
 
 def read_whole(member: Member, fields: Sequence[str], count: int) -> Rows | None:
@@ -152,7 +160,7 @@ def read_whole(member: Member, fields: Sequence[str], count: int) -> Rows | None
     # A warning, a missing geometry or a point of NaN may be damage.
     if captured or (member.driver != GEOJSON and shapes.null_count):
         return None
-    if member.driver != CONTAINER and nowhere:
+    if member.driver != GEOPACKAGE and nowhere:
         return None
     return Rows(
         columns,
@@ -172,7 +180,8 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
     undecoded: list[str] = []
     null_rows: set[int] | None = None  # of a shapefile, which states them
     if member.driver == SHAPEFILE:
-        with member.open() as stream, member.sibling(".shx").open() as index:
+        shx = member.sibling(".shx") or member
+        with member.open() as stream, shx.open() as index:
             content, starts = stream.read(), np.frombuffer(index.read()[100:], dtype=">i4")[::2]
         # The geometry type follows the 8 bytes of the header of a record; 0 is null.
         kinds = ((row, content[8 + 2 * at : 12 + 2 * at]) for row, at in enumerate(starts, 1))
@@ -196,7 +205,7 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
         for row, (name, shape) in enumerate(zip(names, shapes.to_pylist(), strict=True)):
             values = {field: column[row] for field, column in lists.items()}
             null = null_rows is None or rows.read + 1 in null_rows
-            place = _place(rows, shape, null=null, keep=member.driver != CONTAINER)
+            place = _place(rows, shape, null=null, keep=member.driver != GEOPACKAGE)
             rows.add(values, name, place)
         # After a success, try larger blocks again.
         step, failures = min(8 * step, MOST_STEP_ROWS), 0
@@ -230,6 +239,7 @@ def _read(
     Text that is not UTF-8 raises; with a list `undecoded` it becomes None and its field is added to
     the list. A shapefile that does not state its encoding and is not UTF-8 is read as Latin-1.
     """
+    encoding = encoding or member.encoding
     options: dict[str, Any] = {"layer": member.layer, "columns": list(fields), "encoding": encoding}
     options |= {"skip_features": start}
     with open_arrow(

@@ -7,7 +7,8 @@ by row and reports the error of each row; without fiona, pyogrio does it.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,9 @@ from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
 from semsig_gis.sources.rows import LayerBuilder, choose_crs, fits_the_globe
 from semsig_gis.sources.vector import by_pyogrio
 from semsig_gis.sources.vector.by_pyogrio import describe, first_rows_of, layer_names, read_whole
-from semsig_gis.sources.vector.member import CONTAINER, CSV, GEOJSON, Member, members, unreadable
+from semsig_gis.sources.vector.contents import members
+from semsig_gis.sources.vector.formats import CSV, GEOJSON, SINGLE, WITH_FIONA
+from semsig_gis.sources.vector.member import unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -29,7 +32,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Rows
-    from semsig_gis.sources.vector.member import LayerDescription
+    from semsig_gis.sources.vector.member import LayerDescription, Member
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,12 +141,11 @@ def read_tables(
 
 def spatial_layers(path: Path) -> tuple[tuple[Member, LayerDescription], ...]:
     """Return the layers of a vector file that have a geometry, without those in CSV files."""
-    # Only a GeoPackage has to be opened to list its layers.
     layers = (
         layer
         for member in members(path)
         if member.driver != CSV
-        for layer in (_layers_of(member) if member.driver == CONTAINER else [member])
+        for layer in (_layers_of(member) if member.driver not in SINGLE else [member])
     )
     described = ((layer, describe(layer)) for layer in layers)
     return tuple(item for item in described if item[1].geometry != NO_GEOMETRY)
@@ -155,7 +157,9 @@ def _read_rows(
     """Read the rows of a layer, and notes on them."""
     rows = read_whole(member, fields, layer.rows)
     notes: tuple[str, ...] = ()
-    if rows is None:
+    if rows is None and member.driver not in WITH_FIONA:
+        rows, notes = by_pyogrio.read_each(member, fields, layer.rows)
+    elif rows is None:
         try:
             # fiona takes 190 ms to import, and is needed only for damaged files.
             from semsig_gis.sources.vector.by_fiona import read_each  # noqa: PLC0415
@@ -170,7 +174,7 @@ def _read_rows(
         for row, position in enumerate(rows.positions):
             if position is None and rows.numbers[row] not in layer.empty:
                 rows.positions[row] = "its geometry is not valid GeoJSON"
-    return rows, notes
+    return rows, (*member.notes, *notes)
 
 
 def read_layers(
@@ -198,27 +202,35 @@ def first_rows(
 
 def _layers(path: Path) -> tuple[Member, ...]:
     """Return the layers of a file, or of all the files in an archive."""
-    return tuple(layer for member in members(path) for layer in _layers_of(member))
+    layers = [layer for member in members(path) for layer in _layers_of(member)]
+    names = Counter(layer.name for layer in layers)
+    # Layers of the same name in several files are distinguished by the paths of these.
+    return tuple(
+        replace(layer, label=f"{layer.inner}/{layer.name}")
+        if names[layer.name] > 1 and layer.inner
+        else layer
+        for layer in layers
+    )
 
 
 def _layers_of(member: Member) -> list[Member]:
-    is_csv = member.driver == CSV
-    names = [Path(member.inner or member.file).stem] if is_csv else layer_names(member)
-    return [Member(member.file, member.inner, name) for name in names]
+    if member.driver == CSV or member.layer is not None:
+        return [member]
+    return [replace(member, layer=name) for name in layer_names(member)]
 
 
 def _pick(path: Path, name: str | None) -> Member:
     """Return the layer of a name, or the only layer; SourceError if there are several."""
     files = members(path)
-    if name is None and len(files) == 1 and files[0].driver != CONTAINER:
+    if name is None and len(files) == 1 and files[0].driver in SINGLE:
         return files[0]
     layers = _layers(path)
     if name is None and len(layers) > 1:
         # Ignore tables without geometry, such as the styles in a GeoPackage.
         with_geometry = [item for item in layers if _describe(item).geometry != NO_GEOMETRY]
         layers = tuple(with_geometry) or layers
-    names = [str(member.layer) for member in layers]
-    matches = [item for item in layers if name is None or item.layer == name]
+    names = [member.name for member in layers]
+    matches = [item for item in layers if name is None or item.name == name]
     if len(matches) == 1:
         return matches[0]
     if name is not None and not matches:
@@ -252,4 +264,4 @@ def _describe(member: Member) -> LayerInfo:
         if layer.implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
             crs = None
     label = None if crs is None else crs_label(crs)
-    return LayerInfo(str(member.layer), geometry, label, rows, fields)
+    return LayerInfo(member.name, geometry, label, rows, fields)

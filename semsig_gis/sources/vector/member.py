@@ -1,70 +1,88 @@
-"""Members of a vector file: the file itself, or the vector files in an archive."""
+"""Members of a vector file: the file itself, its layers, or the vector files in an archive."""
 
 from __future__ import annotations
 
 import contextlib
+import re
+import shutil
 import sqlite3
-import struct
+import tempfile
+import weakref
 import zipfile
-import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import IO, TYPE_CHECKING
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
-from semsig_gis.sources.paths import require_file
+from semsig_gis.sources.vector.formats import (
+    DRIVERS,
+    FIRST_BYTES,
+    GEODATABASE,
+    SQLITE,
+    content_error,
+)
 
 if TYPE_CHECKING:
     from pyproj import CRS
 
-CSV = "CSV"
-GEOJSON = "GeoJSON"
-SHAPEFILE = "ESRI Shapefile"
-CONTAINER = "GPKG"  # the only driver with several layers in a file
-# The only drivers that may open a file: GDAL has about 80, and some of them follow links.
-DRIVERS: dict[str, str] = {
-    ".csv": CSV,
-    ".fgb": "FlatGeobuf",
-    ".geojson": GEOJSON,
-    ".gpkg": CONTAINER,
-    ".json": GEOJSON,
-    ".shp": SHAPEFILE,
-}
 # Messages of both readers.
 NOT_UTF8 = "some text is not UTF-8 and was read as missing"
 OUT_OF_REACH = "out of reach behind unreadable rows"
-# First bytes of a file by driver, of GeoJSON after white space.
-FIRST_BYTES = {
-    "FlatGeobuf": b"fgb",
-    GEOJSON: b"{",
-    CONTAINER: b"SQLite format 3\0",
-    SHAPEFILE: b"\x00\x00\x27\x0a",
-}
 # GDAL's geometry type of a layer with several types.
 UNKNOWN = "Unknown"
-# In an archive with other data, these files contain a legend or metadata.
-SIDE_SUFFIXES = frozenset({".csv", ".json"})
+START_BYTES = 4096
+# Drivers of GDAL that find their mark anywhere in the start of a file, and follow links.
+LINKING = re.compile(rb"<\s*(OGRVRT|OGRWFS|VRTDataset|WMS_|GDAL_|WFS|OGR[A-Z]+DataSource)")
+
+
+class Copy:
+    """A file in a temporary folder, which is removed together with this object."""
+
+    def __init__(self, name: str) -> None:
+        """Create the folder, for a file of this name."""
+        folder = Path(tempfile.mkdtemp(prefix="semsig-"))
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        self.path = folder / name
 
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A layer of a file, or of the file `inner` of an archive; `layer` None is the first one."""
+    """A layer of a file, or of the file `inner` of an archive; `layer` None is the first one.
+
+    What GDAL cannot open as it is has a `copy` that it can open. `encoding` is that of the texts,
+    if the file does not state it; `label` is the name of the layer where its own is not unique.
+    """
 
     file: Path
     inner: str | None
     layer: str | None = None
+    copy: Copy | None = field(default=None, compare=False)
+    encoding: str | None = None
+    label: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> PurePosixPath | Path:
+        """The path in the archive, or else the path of the file or its copy."""
+        if self.copy is not None:
+            return self.copy.path
+        return self.file if self.inner is None else PurePosixPath(self.inner)
+
+    @property
+    def name(self) -> str:
+        """The name of the layer for users."""
+        return self.label or self.layer or PurePosixPath(self.inner or self.file.name).stem
 
     @property
     def driver(self) -> str:
         """GDAL's name of the one driver that may open it."""
-        return DRIVERS[Path(self.inner or self.file).suffix.lower()]
+        return DRIVERS[self.path.suffix.lower()]
 
     @property
     def address(self) -> str:
         """Path that GDAL opens."""
-        if self.inner is None:
-            file = str(self.file)
+        if self.inner is None or self.copy is not None:
+            file = str(self.path)
             # pyogrio takes the part before a '!' for an archive, and a ';' for the end of the name,
             # except in GDAL's own forms.
             escaped = file.replace("%", "%25").replace("&", "%26")
@@ -78,32 +96,39 @@ class Member:
 
     def open(self) -> IO[bytes]:
         """Return a stream of the bytes of the file."""
-        if self.inner is None:
-            return self.file.open("rb")
+        if isinstance(self.path, Path):
+            return self.path.open("rb")
         with zipfile.ZipFile(self.file) as archive:
-            return archive.open(self.inner)
+            return archive.open(str(self.path))
 
-    def sibling(self, suffix: str) -> Member:
-        """Return the file of the same name with another suffix."""
-        if self.inner is None:
-            return Member(self.file.with_suffix(suffix), None)
-        return Member(self.file, str(PurePosixPath(self.inner).with_suffix(suffix)))
+    def sibling(self, suffix: str) -> Member | None:
+        """Return the file of the same name with another suffix in any case, or None."""
+        wanted = self.path.with_suffix(suffix).name.casefold()
+        if isinstance(self.path, Path):
+            files = (file for file in self.path.parent.iterdir() if file.name.casefold() == wanted)
+            return next((Member(file, None) for file in files), None)
+        with zipfile.ZipFile(self.file) as archive:
+            names = map(PurePosixPath, archive.namelist())
+        same = (name for name in names if name.name.casefold() == wanted)
+        return next(
+            (Member(self.file, str(name)) for name in same if name.parent == self.path.parent), None
+        )
 
     def require_sound(self) -> None:
         """Raise SourceError if the content does not match the suffix, or is damaged."""
+        if self.driver == GEODATABASE:
+            return
         try:
             with self.open() as stream:
-                start = stream.read(4096)
+                start = stream.read(START_BYTES)
         except OSError as error:
             raise unreadable(self, error) from error
-        if self.driver == GEOJSON:
-            start = start.removeprefix(b"\xef\xbb\xbf").lstrip()
-        if not start.startswith(FIRST_BYTES[self.driver]):
-            raise not_of_its_kind(self)
-        if self.driver != CONTAINER or self.inner is not None:
+        if not FIRST_BYTES[self.driver].match(start) or LINKING.search(start):
+            raise content_error(self, start)
+        if self.driver not in SQLITE or not isinstance(self.path, Path):
             return
         # With the messages of GDAL, the readers of a damaged GeoPackage would crash.
-        address = f"{self.file.resolve().as_uri()}?mode=ro"
+        address = f"{self.path.resolve().as_uri()}?mode=ro"
         try:
             with contextlib.closing(sqlite3.connect(address, uri=True)) as connection:
                 verdict = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
@@ -136,62 +161,11 @@ class LayerDescription:
     empty: frozenset[int] = frozenset()
 
 
-def not_of_its_kind(what: object) -> SourceError:
-    """Return the error for a file with content that does not match its suffix."""
-    return SourceError(f"{what} is not the kind of file that its name says; download it again.")
-
-
 def unreadable(what: object, error: BaseException) -> SourceError:
     """Return the error for an exception that a library raised when it opened a file."""
     if isinstance(error, UnicodeDecodeError):
         return SourceError(f"{what} is not UTF-8 text; save it as UTF-8.")
     cause = " ".join(str(error.__cause__ or error).split()).rpartition(" failed: ")[2].rstrip(".")
     if "not recognized" in cause:
-        return not_of_its_kind(what)
+        return SourceError(f"{what} is not the kind of file that its name says; download it again.")
     return SourceError(f"{what} cannot be read ({cause}); it may be damaged, so download it again.")
-
-
-# Exceptions of zipfile for damaged archives.
-_ZIP_FAULTS = (
-    *(EOFError, IndexError, NotImplementedError, OSError, RuntimeError, ValueError),
-    *(struct.error, zipfile.BadZipFile, zlib.error),
-)
-
-
-def members(path: Path) -> tuple[Member, ...]:
-    """Return the members of a file: the file itself, or the vector files in an archive."""
-    suffix = path.suffix.lower()
-    require_file(path, "a vector file")
-    suffixes = {*DRIVERS, ".zip"}
-    if suffix not in suffixes:
-        raise SourceError(
-            f"{path} is not a vector file; give one of {', '.join(sorted(suffixes))}."
-        )
-    if suffix != ".zip":
-        return (Member(path, None),)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            items = [item for item in archive.infolist() if not item.is_dir()]
-            for item in items:
-                if ratio_too_high(item.compress_size, item.file_size):
-                    raise decompression_bomb_error(f"{item.filename} in {path}")
-            names = [item.filename for item in items]
-            broken = archive.testzip()
-    except SourceError:
-        raise
-    except _ZIP_FAULTS as error:
-        raise unreadable(path, error) from error
-    if broken is not None:
-        raise SourceError(f"archive {path} is damaged at {broken}; download it again.")
-    usable = [
-        name
-        for name in names
-        if Path(name).suffix.lower() in DRIVERS and not name.startswith("__MACOSX/")
-    ]
-    if not usable:
-        raise SourceError(
-            f"archive {path} contains no vector file, only {', '.join(names) or 'nothing'}; one of "
-            f"{', '.join(sorted(DRIVERS))} is needed."
-        )
-    data = [name for name in usable if Path(name).suffix.lower() not in SIDE_SUFFIXES]
-    return tuple(Member(path, name) for name in data or usable)
