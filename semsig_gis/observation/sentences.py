@@ -22,7 +22,8 @@ from semsig_gis.core import (
     wrap_degrees,
     wrapped_bearings,
 )
-from semsig_gis.observation.spoken import METRES, read_sentence
+from semsig_gis.observation.sentence_items import METRES
+from semsig_gis.observation.spoken import read_sentence
 from semsig_gis.observation.view import CLASSES, ROUNDING, Photo, View
 from semsig_gis.observation.vocabulary import Vocabulary
 from semsig_gis.sources import class_codes

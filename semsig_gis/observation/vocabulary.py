@@ -45,6 +45,7 @@ LISTS = (
     "between",
     "amid",
     "opposite",
+    "sides",
 )
 TABLES = ("number", "turn", "compass", "range")
 SHORT_WORD = 2

@@ -184,8 +184,8 @@ def _direction(gps: Any, tag: GPS, reference: GPS) -> tuple[float | None, str]: 
 def _panorama(image: Image.Image) -> Shot | None:
     """Return what Google's XMP of a panorama says; its heading is that of the middle column.
 
-    The heading in the XMP is that of the middle of the full panorama, of which the picture may be a
-    part. None if it is about another part than the picture, as after edits.
+    The heading in the XMP is that of the middle of the full panorama, and the picture may be a part
+    of it. None if it is about another part than the picture, as after edits.
     """
     # In Pillow 11, that of PNG and TIFF has other places.
     tags = image.getexif()
@@ -200,11 +200,11 @@ def _panorama(image: Image.Image) -> Shot | None:
     full, high = numbers.get("FullPanoWidthPixels", 0.0), numbers.get("FullPanoHeightPixels", 0.0)
     width = numbers.get("CroppedAreaImageWidthPixels", full)
     height = numbers.get("CroppedAreaImageHeightPixels", high)
-    known = full > 0 and min(width, height) > 0
-    kind = values.get("ProjectionType", "equirectangular" if known else "").lower()
+    has_sizes = full > 0 and min(width, height) > 0
+    kind = values.get("ProjectionType", "equirectangular" if has_sizes else "").lower()
     camera = PANORAMAS.get(kind)
     fov, turn, horizon = FULL_TURN, 0.0, None
-    if camera and known:
+    if camera and has_sizes:
         if not same_shape((width, height), image.size):
             return None
         fov = min(width / full, 1.0) * FULL_TURN

@@ -222,8 +222,8 @@ class ViewBuilder:
             try:
                 exif = read_exif(file)
             except InputError as error:
-                known = shot.filled(Shot(size=self.shot.size))
-                if known.size is None or known.heading is None or field_of_view(known) is None:
+                whole = shot.filled(Shot(size=self.shot.size))
+                if whole.size is None or whole.heading is None or field_of_view(whole) is None:
                     raise
                 tally.unread[picture.name] = str(error)
                 exif = Shot()

@@ -134,8 +134,8 @@ def test_direction_of_travel_is_a_heading_where_there_is_no_other(
     gps: Mapping[Any, Any], expected: tuple[object, ...], tmp_path: Path
 ) -> None:
     shot = read_exif(save(tmp_path, gps=gps))
-    found = (shot.heading, shot.heading_error, shot.north, shot.travels)
-    assert found[: len(expected)] == expected
+    direction = (shot.heading, shot.heading_error, shot.north, shot.travels)
+    assert direction[: len(expected)] == expected
 
 
 SPHERE = {"ProjectionType": "equirectangular", "PoseHeadingDegrees": "90.0"}
@@ -162,7 +162,7 @@ PART = {"CroppedAreaImageWidthPixels": 1000, "CroppedAreaImageHeightPixels": 750
         ),
         # Of a part that was cut or turned later.
         (SPHERE | FULL | PART, (300, 400), (None, None, None, None)),
-        # The long photograph of a phone, whose projection is not known.
+        # The long photograph of a phone, with an unknown projection.
         ({"PoseHeadingDegrees": 300}, (1600, 400), (None, None, 300, None)),
         ({"ProjectionType": "cubemap"}, (400, 300), (None, None, None, None)),
         (
