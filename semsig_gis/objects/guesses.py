@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
+    from semsig_gis.sources import Match
+
 VECTOR = "vector_file"
 # Files that may be a plain table of records, which GDAL cannot read or reads as text.
 TABLE_SUFFIXES = frozenset({".csv", ".gml", ".json", ".parquet"})
@@ -210,16 +212,28 @@ def guess_class(
     for role in keywords("roles").find(names):
         longer = any(match.letters > role.letters for match in classes)
         if ROLE_GEOMETRY[role.name] == geometry and not longer:
-            reason = f'from the name: "{role.words}"'
-            return ClassGuess(role.name, is_role=True, reason=reason, sure=True)
+            return ClassGuess(role.name, is_role=True, reason=_reason(role), sure=not role.doubt)
     if classes:
         first, *others = classes
-        reason = f'from the name: "{first.words}"'
-        other_names = tuple(match.name for match in others)
-        return ClassGuess(first.name, reason=reason, others=other_names, sure=not other_names)
+        # What describes another thing is no rival of it: signals in "signal cabinets".
+        rivals = [match for match in others if first.doubt or not match.doubt]
+        other_names = tuple(match.name for match in rivals)
+        sure = not (first.doubt or other_names)
+        return ClassGuess(first.name, reason=_reason(first), others=other_names, sure=sure)
+    if named := keywords("class_names").find(names):
+        first, *others = named
+        return ClassGuess(
+            first.name, reason=_reason(first), others=tuple(match.name for match in others)
+        )
     if geometry not in {"point", None}:
         return ClassGuess()
     return next(_guesses_by_content(columns, rows), ClassGuess())
+
+
+def _reason(match: Match) -> str:
+    reason = f'from the name: "{match.words}"'
+    is_other = match.doubt not in {"", *match.words.split()}  # not the end of a compound
+    return f'{reason}, but what is "{match.doubt}"?' if is_other else reason
 
 
 def _guesses_by_content(columns: Sequence[Column], rows: int) -> Iterator[ClassGuess]:

@@ -7,7 +7,7 @@ import re
 import tomllib
 import unicodedata
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from semsig_gis.core import WILDCARD, UnknownNameError, nearest_name
 from semsig_gis.sources.catalog import data_folder, load_catalog
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Taxonomy
 
-# Word boundaries in camel case, such as ArbresAlign and WCPublic.
-CAMEL_CASE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+# Word boundaries in camel case, such as ArbresAlign and WCPublic, but not AEDs.
+CAMEL_CASE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])(?!.s\b)")
 # Keywords up to this length must be a whole word, because too many words start with them.
 WHOLE_WORD_LETTERS = 3
 ARTICLES = frozenset(
@@ -30,6 +30,18 @@ ARTICLES = frozenset(
 )  # fmt: skip
 
 
+# Words between a thing and what belongs to it.
+PREPOSITIONS = frozenset(
+    {"about", "d", "da", "das", "de", "degli", "dei", "del", "dell", "della", "delle", "der", "des",
+     "di", "do", "dos", "du", "for", "fur", "of", "on", "para", "per", "pour", "sur", "van", "von"}
+)  # fmt: skip
+# Endings of the plural and of other forms of a keyword; Italian and some other keywords are stems.
+ENDINGS = frozenset(
+    {"", "a", "al", "as", "e", "ed", "ee", "ees", "elle", "en", "er", "ern", "es", "i", "ia", "ici",
+     "is", "ken", "le", "li", "n", "na", "ne", "nen", "no", "ns", "o", "os", "re", "ri", "s", "se",
+     "x"}
+)  # fmt: skip
+
 Codes = tuple[int, ...]
 Term = tuple[str, Codes, str]
 """A word for a thing, with its language before and the class codes that it may be of."""
@@ -39,12 +51,15 @@ Term = tuple[str, Codes, str]
 class Match:
     """A class or role with a keyword in a text, and the matching words of the text.
 
-    `letters` is the length of the keyword; a longer keyword is a better match.
+    `letters` is the length of the keyword; a longer keyword is a better match. `doubt` is a word
+    that may say that the text is about something else, as "complaints" in "tree complaints"; empty
+    if there is none.
     """
 
     name: str
     words: str
     letters: int
+    doubt: str = ""
 
 
 def words_of(text: str) -> tuple[str, ...]:
@@ -52,79 +67,190 @@ def words_of(text: str) -> tuple[str, ...]:
 
     Words also end where a capital follows (``WCPublic``) and between letters and digits.
     """
+    return tuple(word for word in _all_words(text) if word not in ARTICLES)
+
+
+def _all_words(text: str) -> list[str]:
+    """Return the words of `words_of` with articles and prepositions."""
     letters = unicodedata.normalize("NFKD", text)
     plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
     parts = re.findall(r"[^\W\d_]+|\d+", CAMEL_CASE.sub(" ", plain))
-    return tuple(word for part in parts if (word := part.casefold()) not in ARTICLES)
+    return [part.casefold() for part in parts]
 
 
 @dataclass(frozen=True, slots=True)
 class Keywords:
-    """Names of classes, roles or kinds of field, each with the words of a keyword."""
+    """Names of classes, roles or kinds of field, each with the words of a keyword.
+
+    `whole` is whether the words of a text have to be those of the keyword, except their endings.
+    Keywords `before_heads` may stand before the word that says what a thing is ("tree pit").
+    """
 
     phrases: tuple[tuple[str, tuple[str, ...]], ...]
+    whole: bool = False
+    before_heads: frozenset[tuple[str, ...]] = frozenset()
 
     @classmethod
-    def of(cls, pairs: Iterable[tuple[str, str]]) -> Keywords:
+    def of(
+        cls,
+        pairs: Iterable[tuple[str, str]],
+        *,
+        whole: bool = False,
+        before_heads: Iterable[str] = (),
+    ) -> Keywords:
         """Return the keywords of pairs of a name and a phrase, without duplicates."""
-        return cls(tuple(dict.fromkeys((name, words_of(phrase)) for name, phrase in pairs)))
+        phrases = tuple(dict.fromkeys((name, words_of(phrase)) for name, phrase in pairs))
+        return cls(phrases, whole, frozenset(map(words_of, before_heads)))
 
     def find(self, text: str) -> tuple[Match, ...]:
-        """Find the keywords in a text, the longest first and each name once.
+        """Find the keywords in a text, those without doubt first, then the longest.
 
-        A keyword inside a longer keyword does not count.
+        Each name is found once. A keyword inside a longer keyword does not count.
         """
         words = words_of(text)
+        none = (("", phrase) for phrase in _neighbours().none)
         spans = [
-            (start, end, Match(name, " ".join(words[start:end]), sum(map(len, phrase))))
-            for name, phrase in self.phrases
+            _Span(start, found[0], name, phrase, found[1])
+            for name, phrase in (*self.phrases, *none)
             for start in range(len(words))
-            if (end := _end(words, start, phrase)) is not None
+            if words[start].startswith(phrase[0])  # most fail here
+            and (found := _end(words, start, phrase))
+            and not (self.whole and found[1])
         ]
         # Python's sort keeps the order of the file among keywords of the same length.
-        spans.sort(key=lambda span: (-span[2].letters, span[0]))
+        spans.sort(key=lambda span: (-span.letters, span.start))
         best: dict[str, Match] = {}
-        for start, end, match in spans:
-            if not any(
-                first <= start and end <= last and other.letters > match.letters
-                for first, last, other in spans
+        for span in spans:
+            if span.name and not any(
+                other.start <= span.start and span.end <= other.end and other.letters > span.letters
+                for other in spans
             ):
-                best.setdefault(match.name, match)
-        return tuple(best.values())
+                doubt = self._doubt(span, words, text)
+                match = Match(
+                    span.name, " ".join(words[span.start : span.end]), span.letters, doubt
+                )
+                if span.name not in best or (best[span.name].doubt and not doubt):
+                    best[span.name] = match
+        return tuple(sorted(best.values(), key=lambda match: match.doubt != ""))
+
+    def _doubt(self, span: _Span, words: tuple[str, ...], text: str) -> str:
+        """Return the word that may say what a text is about in place of a keyword, or nothing."""
+        near = _neighbours()
+        last = words[span.end - 1]
+        if span.rest and span.rest.removeprefix("s").removeprefix("n") not in near.same:
+            return last  # a compound
+        others = (*words[: span.start], *words[span.end :])
+        if doubt := next((word for word in others if word in near.other), ""):
+            return doubt
+        following = "".join(words[span.end : span.end + 1])
+        singular = last.endswith(span.phrase[-1]) and not last.endswith("s")
+        if singular and span.phrase in self.before_heads and _says_more(following):
+            return following
+        every = _all_words(text)
+        for head, link, word in zip(every, every[1:], every[2:], strict=False):
+            # "cabinets of signals"
+            if (head, word) == (*words[span.start - 1 : span.start], words[span.start]):
+                return head if link in PREPOSITIONS and _says_more(head) else ""
+        return ""
 
 
-def _end(words: tuple[str, ...], start: int, phrase: tuple[str, ...]) -> int | None:
-    """Return the index after `phrase` if it matches the words at `start`; None if not."""
-    if len(phrase) > 1 and words[start].startswith("".join(phrase)):
-        return start + 1  # written as one word
+class _Span(NamedTuple):
+    """A keyword at words ``start:end``; `rest` is the end of its last word, if not an ending."""
+
+    start: int
+    end: int
+    name: str
+    phrase: tuple[str, ...]
+    rest: str
+
+    @property
+    def letters(self) -> int:
+        return sum(map(len, self.phrase))
+
+
+def _says_more(word: str) -> bool:
+    """Whether a word next to a keyword may change its meaning; numbers and "locations" do not."""
+    return word != "" and not word.isdecimal() and word not in _neighbours().same
+
+
+def _end(words: tuple[str, ...], start: int, phrase: tuple[str, ...]) -> tuple[int, str] | None:
+    """Return the index after `phrase` and the rest of its last word if it is at `start`."""
+    joined = "".join(phrase)
+    if len(phrase) > 1 and words[start].startswith(joined):  # written as one word
+        return start + 1, _rest(words[start], joined)
     end = start + len(phrase)
     if end > len(words):
         return None
     for word, keyword in zip(words[start:end], phrase, strict=True):
         is_short = len(keyword) <= WHOLE_WORD_LETTERS
-        if not (word in {keyword, f"{keyword}s"} if is_short else word.startswith(keyword)):
+        if not (
+            word in {keyword, f"{keyword}s", f"{keyword}es"}
+            if is_short
+            else word.startswith(keyword)
+        ):
             return None
-    return end
+    return end, _rest(words[end - 1], phrase[-1])
+
+
+def _rest(word: str, keyword: str) -> str:
+    """Return what follows a keyword in a word, if it is not an ending."""
+    rest = word.removeprefix(keyword)
+    return "" if rest in ENDINGS else rest
+
+
+@dataclass(frozen=True, slots=True)
+class _Neighbours:
+    """Words next to keywords: that change nothing, that change all, and phrases of no class."""
+
+    same: frozenset[str]
+    other: frozenset[str]
+    none: tuple[tuple[str, ...], ...]
+
+
+@functools.cache
+def _neighbours() -> _Neighbours:
+    table = _content()["neighbours"]
+
+    def forms(lists: Mapping[str, list[str]]) -> frozenset[str]:
+        words = [word for language in lists.values() for word in language]
+        return frozenset(f"{word}{ending}" for word in words for ending in ENDINGS)
+
+    none = (words_of(phrase) for language in table["none"].values() for phrase in language)
+    return _Neighbours(forms(table["same"]), forms(table["other"]), tuple(none))
 
 
 @functools.cache
 def keywords(kind: str) -> Keywords:
     """Return the shipped keywords of a kind.
 
-    Kinds are ``"classes"`` (words for classes), ``"class_fields"`` (names of fields that imply the
-    class of a layer), ``"roles"`` (layers without objects) and ``"fields"`` (uses of fields).
+    Kinds are ``"classes"`` (words for classes), ``"class_names"`` (their names and what people say
+    in English), ``"class_fields"`` (names of fields that imply the class of a layer), ``"roles"``
+    (layers without objects) and ``"fields"`` (uses of fields).
     """
     content = _content()
     if kind == "fields":
         groups = content["fields"].items()
         return Keywords.of((name, word) for name, words in groups for word in words)
+    if kind == "class_names":
+        named = [
+            (name, word)
+            for name, lists in content["classes"].items()
+            for word in (name.replace("_", " "), *lists.get(SPOKEN, {}).get("en", ()))
+        ]
+        return Keywords.of(named, whole=True, before_heads=[word for _, word in named])
     fields = kind == "class_fields"
-    return Keywords.of(
-        (name, word)
+    lists = [
+        (name, key, word)
         for name, lists in content["classes" if fields else kind].items()
         for key, words in lists.items()
         if (key == "fields") == fields and key != SPOKEN
         for word in words
+    ]
+    # In English, the last word says what a thing is; in German and Dutch, it ends a compound.
+    elsewhere = {word for _, key, word in lists if key in {"fr", "es", "it", "pt"}}
+    return Keywords.of(
+        ((name, word) for name, _, word in lists),
+        before_heads=(word for _, key, word in lists if key == "en" and word not in elsewhere),
     )
 
 

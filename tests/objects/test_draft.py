@@ -416,6 +416,45 @@ def test_classes_are_recognised_in_layer_names(classes: str) -> None:
         assert [match.name for match in keywords("classes").find(name)] == classes.split(), name
 
 
+# Names of layers, with the class that is guessed, and whether it is asked about.
+GUESSES = {
+    "street_cabinet": [
+        *("Traffic-signal cabinets", "TrafficSignalCabinets", "cabinets of traffic signals"),
+        *("armoires de feux tricolores", "armarios de semáforos", "street_cabinets"),
+    ],
+    "alignment_tree": ["school trees", "tree_locations_2021", "les arbres", "liste des arbres"],
+    "alignment_tree?": ["tree pits", "tree guards", "Baumscheiben", "grilles d'arbres"],
+    "": ["bench mark", "Benchmarks", "water meters", "taxiways", "Baumschule", "tree house"],
+    "street_light": ["Lichtmasten", "Straßenbeleuchtung", "streetlights 2020", "EclairagePublic"],
+    "street_light?": ["lamp post banners", "street light complaints", "Street_Light_Outages"],
+    "bus_stop?": ["bus stop flags", "bus_stop_shelters"],
+    "parking_meter?": ["parking meter transactions", "requests for parking meters"],
+    "fire_hydrant?": ["fire hydrant inspections"],
+    "bicycle_stand?": ["bike rack requests"],
+    "tram_stop": ["light rail stops"],
+    "traffic_light?": ["signal boxes", "traffic signal boxes", "Ampelschaltschränke"],
+    "manhole?": ["manhole covers", "manholes"],
+    "defibrillator": ["AEDs"],
+    "playground?": ["playgrounds"],
+}
+
+
+@pytest.mark.parametrize("expected", GUESSES)
+def test_a_name_is_what_its_head_says_or_is_asked_about(expected: str) -> None:
+    for name in GUESSES[expected]:
+        guess = guess_class(name, [], geometry="point", rows=4)
+        asked = "" if guess.sure or not guess.name else "?"
+        assert f"{guess.name}{asked}" == expected, name
+
+
+def test_a_role_is_asked_about_if_another_word_follows() -> None:
+    sure = guess_class("buildings", [], geometry="polygon", rows=4)
+    asked = guess_class("building permits", [], geometry="polygon", rows=4)
+    assert (sure.name, sure.sure) == ("buildings", True)
+    assert (asked.name, asked.sure) == ("buildings", False)
+    assert '"permits"' in asked.reason
+
+
 def test_longest_keyword_wins_over_its_parts() -> None:
     own = Keywords.of([("sign", "light"), ("lamp", "street light"), ("lamp", "lamp")])
     assert own.find("Street_Lights") == (Match("lamp", "street lights", 11),)
