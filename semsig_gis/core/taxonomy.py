@@ -167,7 +167,10 @@ class Taxonomy(Displayed):
 
     @classmethod
     def from_list(cls, items: Iterable[Mapping[str, Any]]) -> Taxonomy:
-        """Return a taxonomy from plain mappings, the inverse of `to_list`."""
+        """Return a taxonomy from plain mappings, the inverse of `to_list`; TypeError for others."""
+        items = list(items)
+        if not all(isinstance(item, dict) for item in items):
+            raise TypeError("a class is no mapping")
         return cls(
             tuple(
                 ObjectClass(**{"family": _usual_family(item.get("code", MAX_CODE)), **item})

@@ -262,9 +262,14 @@ class City(Displayed):
             raise DatabaseError(
                 f"the parts of {self.path} do not agree on their {name}; compute it again."
             )
-        names = ["cell_id", *entries[0]["columns"]]
+        try:
+            names, facts = ["cell_id", *map(str, entries[0]["columns"])], dict(entries[0]["facts"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise DatabaseError(
+                f"the {name} in {self.path} is damaged ({error}); compute it again."
+            ) from error
         tables = [read_geoparquet(file, kind=KIND, columns=names)[0] for file in files]
-        return pa.concat_tables(tables).sort_by("cell_id"), dict(entries[0]["facts"])
+        return pa.concat_tables(tables).sort_by("cell_id"), facts
 
     def put_columns(
         self, name: str, columns: pa.Table, *, cell_ids: NDArray[np.int64], facts: dict[str, Any]

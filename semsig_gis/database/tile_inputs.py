@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from pyproj import CRS
@@ -107,6 +108,7 @@ def widest_street(streets: Path) -> float:
     """Return the largest half-width of the streets in metres, 0 if the file has none."""
     if HALF_WIDTH not in pq.read_schema(streets).names:
         return 0.0
-    widths = pq.read_table(streets, columns=[HALF_WIDTH], **VERIFY_CHECKSUMS)[HALF_WIDTH].to_numpy()
-    finite = widths[np.isfinite(widths.astype(np.float64))]
-    return float(finite.max(initial=0.0))
+    table = pq.read_table(streets, columns=[HALF_WIDTH], **VERIFY_CHECKSUMS)
+    # As `read_surroundings` reads them.
+    widths = pd.to_numeric(table[HALF_WIDTH].to_pandas(), errors="coerce").to_numpy(np.float64)
+    return float(widths[np.isfinite(widths)].max(initial=0.0))

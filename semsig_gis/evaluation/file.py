@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import geopandas as gpd
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
+import shapely
 
 from semsig_gis.core import DatabaseError, InputError
 from semsig_gis.evaluation.queries.distortion_text import chain_text, parse_chain
@@ -18,10 +20,12 @@ from semsig_gis.evaluation.queries.draw import QuerySpec
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
 from semsig_gis.localization import noise_from_dict, parse_method
 from semsig_gis.storage import (
+    UNREADABLE,
     geo_metadata,
     parse_json,
     read_geoparquet,
     read_whole,
+    require_kinds,
     write_geoparquet,
     write_whole,
 )
@@ -31,8 +35,23 @@ if TYPE_CHECKING:
 
     from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
     from semsig_gis.localization import AnyMethod, Noise
+    from semsig_gis.storage import ColumnKind
 
 KIND = "localization evaluation"
+TEXTS = ("types", "query_types", "query_bearings", "query_ranges", "query_sectors", "next_cell_ids")
+WHOLE = (
+    *("seed", "number", "cell", "cell_id", "length", "type_group", "angle_group", "query_length"),
+    *("tied", "rank_low", "rank_high"),
+)
+QUERY_KINDS: dict[str, ColumnKind] = {
+    **dict.fromkeys(QUERY_COLUMNS, "number"),
+    **dict.fromkeys(TEXTS, "text"),
+    "best_cell_id": "whole",
+}
+CHANCES = (
+    *(name for name in QUERY_COLUMNS if name[0] == "p" or name.startswith("near")),
+    *("chance", "right", "in_region"),
+)
 QUERIES, SUMMARY, TIMING = "queries.parquet", "evaluation.json", "timing.json"
 
 
@@ -115,6 +134,7 @@ def open_evaluation(folder: str | Path) -> Evaluation:
     table, specs, crs = read_geoparquet(file, kind=KIND, columns=[*QUERY_COLUMNS, "geometry"])
     times = Path(folder) / TIMING
     try:
+        _check(table, specs)
         frame = table.to_pandas()
         points = gpd.GeoSeries.from_wkb(frame.pop("geometry"), crs=crs)
         frame["best_cell_id"] = frame["best_cell_id"].astype("Int64")
@@ -132,8 +152,23 @@ def open_evaluation(folder: str | Path) -> Evaluation:
             versions=specs["versions"],
             machine=timing.get("machine", {}),
         )
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
+    except (*UNREADABLE, shapely.errors.ShapelyError) as error:
         raise DatabaseError(f"{file} is damaged ({error}); evaluate again.") from error
+
+
+def _check(table: pa.Table, specs: dict[str, Any]) -> None:
+    """Raise LookupError, TypeError or ValueError if columns or specs cannot be of an evaluation."""
+    require_kinds(table, QUERY_KINDS, may_lack=[*QUERY_KINDS])
+    require_kinds(table, dict.fromkeys(WHOLE, "whole"))
+    for name in CHANCES:
+        limits = pc.min_max(table[name]).as_py()
+        if limits["min"] is not None and not 0 <= limits["min"] <= limits["max"] <= 1:
+            raise ValueError(f"its column {name} has values that are not from 0 to 1")
+    low, high = table["rank_low"].to_numpy(), table["rank_high"].to_numpy()
+    if not ((low >= 1) & (high >= low)).all():
+        raise ValueError("its ranks do not fit each other")
+    if not isinstance(specs["database"]["cells"], int):
+        raise TypeError("its number of cells is no number")
 
 
 def settings_to_dict(method: AnyMethod, query_spec: QuerySpec) -> dict[str, Any]:

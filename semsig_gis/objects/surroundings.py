@@ -13,7 +13,7 @@ import shapely
 from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 
-from semsig_gis.core import CLASS_NAME, LICENSES, NAME, InputError, SourceError
+from semsig_gis.core import CLASS_NAME, HALF_WIDTH, LICENSES, NAME, InputError, SourceError
 from semsig_gis.objects.table import layer_licences
 from semsig_gis.sources import (
     NUMBERS,
@@ -314,6 +314,13 @@ def _read(
     if (len(table) == 0 and box is None) or len(others):
         content = f"contains a {others.iloc[0].geom_type}" if len(others) else f"contains no {kind}"
         raise InputError(f"{where} {content}; give {_of_kind(path, kind)}.")
+    if HALF_WIDTH in table:  # a file of a user may have widths that are not numbers
+        import pandas as pd  # noqa: PLC0415 - 0.4 s
+
+        widths = pd.to_numeric(table[HALF_WIDTH], errors="coerce").astype(np.float64)
+        if remark is not None and (lost := int((widths.isna() & table[HALF_WIDTH].notna()).sum())):
+            remark(f"{where}: {HALF_WIDTH} is no number in {lost:,} rows, and not used there")
+        table[HALF_WIDTH] = widths
     return table.to_crs(parse_crs(crs))
 
 

@@ -46,7 +46,9 @@ from semsig_gis.storage import (
     hilbert_order,
     points_to_wkb,
     read_geoparquet,
+    require_kinds,
     rows_meeting,
+    texts_of,
     whole_numbers,
     wkb_to_points,
     write_geoparquet,
@@ -63,6 +65,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Axes, MapFrame
     from semsig_gis.sources import RawLayer
+    from semsig_gis.storage import ColumnKind
 
 KIND = "street objects"
 # Columns without the geometry, and their types.
@@ -393,7 +396,7 @@ def objects_specs(objects: StreetObjects) -> dict[str, Any]:
 
 def _licences(specs: Mapping[str, Any], sources: Iterable[str]) -> tuple[Licence, ...]:
     """Return the licences of a file from its specs and the layers of its objects."""
-    lines = specs["licenses"]
+    lines = list(map(str, specs["licenses"]))
     if LICENSE_LAYERS not in specs:
         layers = frozenset(sources)
         return tuple(_licence_of(line, layers) for line in lines)
@@ -482,7 +485,7 @@ def objects_of(
     """
     try:
         arrow.validate(full=True)
-        _require_columns(arrow)
+        arrow = _checked(arrow)
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
         for code in arrow[CLASS_CODE].unique().to_pylist():
             taxonomy.by_code(code)
@@ -513,16 +516,20 @@ def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
     return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
 
 
-def _require_columns(arrow: pa.Table) -> None:
-    """Raise KeyError for a missing column, TypeError for a column of another type."""
+def _checked(arrow: pa.Table) -> pa.Table:
+    """Return the table of a file with empty texts for nulls; raise as `require_kinds` does."""
     arrow.select([*REQUIRED, GEOMETRY])
-    for field in arrow.schema:
-        kind = field.type
-        if field.name == HEIGHT:
-            valid = pa.types.is_floating(kind)
-        elif field.name in NUMBERS:
-            valid = pa.types.is_integer(kind) and not arrow[field.name].null_count
-        else:
-            valid = kind in {pa.string(), pa.large_string(), pa.null()}
-        if field.name in COLUMNS and not valid:
-            raise TypeError(f"its column {field.name} contains {kind}")
+    names = [name for name in COLUMNS if name in arrow.column_names]
+    for name in names:
+        if name not in NUMBERS:
+            place = arrow.column_names.index(name)
+            arrow = arrow.set_column(place, name, texts_of(arrow[name]))
+    kinds: dict[str, ColumnKind] = {
+        name: "text" if name not in NUMBERS else "number" if name == HEIGHT else "whole"
+        for name in names
+    }
+    require_kinds(arrow, kinds, may_lack=[HEIGHT])
+    counts = pc.min_max(arrow[COUNT]).as_py()
+    if len(arrow) and not 1 <= counts["min"] <= counts["max"] <= np.iinfo(np.int32).max:
+        raise ValueError(f"its column {COUNT} has numbers from {counts['min']} to {counts['max']}")
+    return arrow

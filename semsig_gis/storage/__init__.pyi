@@ -7,6 +7,7 @@ from .geoparquet import GROUP_ROWS as GROUP_ROWS
 from .geoparquet import UNREADABLE as UNREADABLE
 from .geoparquet import VERIFY_CHECKSUMS as VERIFY_CHECKSUMS
 from .geoparquet import WRITE_CHECKSUMS as WRITE_CHECKSUMS
+from .geoparquet import ColumnKind as ColumnKind
 from .geoparquet import add_footer_checksum as add_footer_checksum
 from .geoparquet import bounds_by_group as bounds_by_group
 from .geoparquet import bounds_column as bounds_column
@@ -17,7 +18,9 @@ from .geoparquet import groups_meeting as groups_meeting
 from .geoparquet import hilbert_order as hilbert_order
 from .geoparquet import points_to_wkb as points_to_wkb
 from .geoparquet import read_geoparquet as read_geoparquet
+from .geoparquet import require_kinds as require_kinds
 from .geoparquet import rows_meeting as rows_meeting
+from .geoparquet import texts_of as texts_of
 from .geoparquet import whole_numbers as whole_numbers
 from .geoparquet import wkb_to_points as wkb_to_points
 from .geoparquet import write_geoparquet as write_geoparquet

@@ -13,10 +13,11 @@ import math
 import os
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import shapely
 from pyproj import CRS
@@ -27,7 +28,7 @@ from semsig_gis.storage.text import parse_json
 from semsig_gis.storage.whole import reason, whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -151,10 +152,42 @@ def bounds_by_group(path: str | Path) -> Iterator[NDArray[np.float64]]:
 
 
 UNREADABLE = (
-    *(pa.ArrowException, OSError, ValueError, LookupError, TypeError),
+    *(pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError),
     CRSError,
 )
 """Errors of geopandas for a damaged file, where the geometries can be read."""
+
+ColumnKind = Literal["whole", "number", "text"]
+"""What a column of a file contains; whole numbers are numbers as well."""
+
+_IS_KIND: dict[ColumnKind, Callable[[pa.DataType], bool]] = {
+    "whole": pa.types.is_integer,
+    "number": lambda kind: pa.types.is_integer(kind) or pa.types.is_floating(kind),
+    "text": lambda kind: pa.types.is_string(kind) or pa.types.is_large_string(kind),
+}
+
+
+def require_kinds(
+    table: pa.Table, kinds: Mapping[str, ColumnKind], *, may_lack: Collection[str] = ()
+) -> None:
+    """Check the columns of a file; those in `may_lack` may have nulls.
+
+    KeyError for a missing column, TypeError for one of another kind, ValueError for nulls.
+    """
+    for name, kind in kinds.items():
+        column = table[name]
+        if not _IS_KIND[kind](column.type):
+            raise TypeError(f"its column {name} contains {column.type}")
+        if column.null_count and name not in may_lack:
+            raise ValueError(f"its column {name} has {column.null_count:,} rows without a value")
+
+
+def texts_of(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Return a column of texts with an empty text for every null; other columns as they are."""
+    if pa.types.is_null(column.type):
+        column = column.cast(pa.string())
+    return pc.fill_null(column, "") if _IS_KIND["text"](column.type) else column
+
 
 SPEC_KEY = b"semsig"
 COMPRESSION = 3
@@ -386,11 +419,9 @@ def read_geoparquet(
     except (pa.ArrowException, OSError, ValueError) as error:
         raise_if_short(error)
         raise DatabaseError(f"{file} is damaged; make the {kind} file again.") from error
-    missing = set(columns or ()) - set(table.column_names)
+    missing = [name for name in columns or () if name not in table.column_names]
     if missing:
-        raise DatabaseError(
-            f"{file} lacks the column {min(missing)!r}; make the {kind} file again."
-        )
+        raise DatabaseError(f"{file} lacks the column {missing[0]!r}; make the {kind} file again.")
     return table, specs, crs
 
 

@@ -20,6 +20,7 @@ from semsig_gis.core import (
 )
 from semsig_gis.database import City
 from semsig_gis.localization import index_fingerprint, noise_from_dict
+from semsig_gis.storage import require_kinds
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from semsig_gis.core import Axes, MapFrame
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization import Noise
+    from semsig_gis.storage import ColumnKind
 
 
 NAME = "identifiability"
@@ -376,14 +378,25 @@ def _parsed(
     names = {item.code: item.name for item in database.taxonomy.classes}
     ids = database.cell_ids
     places = [name for name in table.column_names if name.endswith("_chance")]
+    rows_of = [name.removesuffix("_chance") for name in places]
+    gains = [f"gain_{names[item.code]}" for item in classes]
+    numbers = ["chance_itself", "chance_near", "chance_found", "bits_left", *places, *gains]
+    kinds: dict[str, ColumnKind] = {
+        **dict.fromkeys(numbers, "number"),
+        **dict.fromkeys(rows_of, "whole"),
+    }
+    require_kinds(table, kinds, may_lack=rows_of)
 
     def stacked(columns: list[str]) -> np.ndarray:
         return np.stack([table[name].to_numpy() for name in columns], axis=1)
 
     def rows(name: str) -> np.ndarray:
         cells = table[name]
-        numbers = np.searchsorted(ids, cells.fill_null(ids[0]).to_numpy())
-        return np.where(cells.is_valid().to_numpy(), numbers, -1)
+        known = cells.fill_null(ids[0]).to_numpy()
+        found = np.minimum(np.searchsorted(ids, known), len(ids) - 1)
+        if not np.array_equal(ids[found], known):
+            raise ValueError(f"its column {name} names cells that are not in the database")
+        return np.where(cells.is_valid().to_numpy(), found, -1)
 
     return Identifiability(
         database=database,
@@ -394,9 +407,9 @@ def _parsed(
         near=table["chance_near"].to_numpy(),
         found=table["chance_found"].to_numpy(),
         bits=table["bits_left"].to_numpy(),
-        lookalikes=np.stack([rows(name.removesuffix("_chance")) for name in places], axis=1),
+        lookalikes=np.stack([rows(name) for name in rows_of], axis=1),
         lookalike_chances=stacked(places),
-        gains=stacked([f"gain_{names[item.code]}" for item in classes]),
+        gains=stacked(gains),
         classes=classes,
         trials=int(facts["trials"]),
         seed=int(facts["seed"]),
