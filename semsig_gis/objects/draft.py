@@ -63,8 +63,12 @@ PLANE = "EPSG:3857"
 # Mark of lines that a person must check.
 EDIT = "EDIT"
 FILTERS_SHOWN = 8
+VALUES_SHOWN = 6
 # Maximum number of rows per value of a field that may identify objects.
 MAX_ROWS_PER_ID = 10
+# Minimum share of rows whose class a field names, for it to decide; and the minimum share of other
+# classes than that of the name of the layer.
+MIN_NAMED, MIN_OTHERS = 0.5, 0.2
 GEOMETRIES = {"Point": "point", "LineString": "line", "LinearRing": "line", "Polygon": "polygon"}
 
 
@@ -78,9 +82,34 @@ class _Draft:
     geometry: str | None
     guess: ClassGuess
     class_by: tuple[str, dict[str, str]] | None
+    mixed: bool
     position: tuple[str, ...]
     crs: str | None
     crs_reason: str = ""
+
+    @property
+    def unlisted(self) -> dict[str, int]:
+        """Numbers of rows whose value of the field `class_by` names no class."""
+        if self.class_by is None:
+            return {}
+        field, classes = self.class_by
+        (column,) = (column for column in self.columns if column.name == field)
+        counts = {
+            str(value): count
+            for value, count in column.counts.most_common()
+            if value not in classes
+        }
+        return counts | ({f"no {field}": column.missing} if column.missing else {})
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all rows were read."""
+        return len(self.sample.rows) == self.sample.info.rows
+
+    @property
+    def needs_class(self) -> bool:
+        """Whether some rows get the class of the layer."""
+        return not self.mixed or bool(self.unlisted) or not self.is_whole
 
 
 def draft_catalog(path: str | Path, *, crs: AnyCrs | None = None) -> str:
@@ -188,14 +217,30 @@ def _draft(path: Path, sample: LayerSample, crs: str | None) -> _Draft:
             "give a file with coordinates."
         )
     names = f"{path.stem} / {sample.info.name}"
-    guess = guess_class(names, columns, geometry=geometry, rows=len(sample.rows))
-    if not guess.name:  # a class of its own, named after the file
+    rows = len(sample.rows)
+    guess = guess_class(names, columns, geometry=geometry, rows=rows)
+    candidates = [column for column in columns if column.meant_for("filter") or not guess.sure]
+    class_by = None if guess.is_role else guess_class_by(candidates, guess.name, sure=guess.sure)
+    mixed = class_by is not None and _is_mixed(class_by, columns, guess, rows)
+    if not guess.name or (mixed and not guess.sure):  # a class of its own, named after the file
         name = re.sub(r"[^a-z0-9]+", "_", _snake(path.stem)).strip("_")
         guess = ClassGuess(name if name[:1].isalpha() else f"layer_{name}".rstrip("_"))
-    candidates = [column for column in columns if column.meant_for("filter") or not guess.sure]
-    class_by = None if guess.is_role else guess_class_by(candidates, guess.name)
     crs, crs_reason = _crs(path, sample, position, crs)
-    return _Draft(path, sample, columns, geometry, guess, class_by, position, crs, crs_reason)
+    return _Draft(
+        path, sample, columns, geometry, guess, class_by, mixed, position, crs, crs_reason
+    )
+
+
+def _is_mixed(
+    class_by: tuple[str, dict[str, str]], columns: Sequence[Column], guess: ClassGuess, rows: int
+) -> bool:
+    """Whether a field gives the classes of most rows, and the name of the layer does not."""
+    field, classes = class_by
+    (counts,) = (column.counts for column in columns if column.name == field)
+    named = sum(counts[value] for value in classes)
+    others = sum(counts[value] for value, name in classes.items() if name != guess.name)
+    several = len(set(classes.values())) > 1
+    return several and named >= MIN_NAMED * rows and others >= MIN_OTHERS * rows * guess.sure
 
 
 def _crs(
@@ -246,25 +291,21 @@ def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
     """Yield stanzas for classes that are not built in."""
     taxonomy = built_in_taxonomy()
     built_in = {item.name for item in taxonomy.classes}
-    used = [draft.guess.name for draft in drafts if draft.guess.name and not draft.guess.is_role]
-    possible = [name for draft in drafts if draft.class_by for name in draft.class_by[1].values()]
-    for name in dict.fromkeys([*used, *possible]):
-        if name in built_in:
-            continue
-        taxonomy = taxonomy.extended([name])
-        item = taxonomy.by_name(name)
-        comment = "" if name in used else "# "
-        yield from [""] if name in used else ["", "# For class_by below:"]
-        yield f"{comment}[[classes]]"
-        for key in ("code", "symbol", "name", "title"):
-            yield f"{comment}{key} = {json.dumps(getattr(item, key), ensure_ascii=False)}"
+    used = [draft.guess.name for draft in drafts if draft.needs_class and not draft.guess.is_role]
+    for name in dict.fromkeys(used):
+        if name not in built_in:
+            taxonomy = taxonomy.extended([name])
+            item = taxonomy.by_name(name)
+            yield from ("", "[[classes]]")
+            for key in ("code", "symbol", "name", "title"):
+                yield f"{key} = {json.dumps(getattr(item, key), ensure_ascii=False)}"
 
 
 def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
     info = draft.sample.info
     yield "[[layers]]"
     yield f"name = {_text(name)}"
-    yield _class(draft.guess)
+    yield from _class(draft)
     yield f"files = [{_text(glob.escape(draft.file.name))}]"
     if several:
         yield f"layer = {_text(info.name)}"
@@ -283,17 +324,35 @@ def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
     yield f"# Fields: {', '.join(_plain(field) for field in info.fields) or 'none'}"
 
 
-def _class(guess: ClassGuess) -> str:
-    if not guess.reason:
-        return (
-            f"class = {_text(guess.name)}  # {EDIT}: unknown; write a class (or "
+def _class(draft: _Draft) -> Iterator[str]:
+    """Yield the lines with the class or the role, and with the field that decides the class."""
+    guess = draft.guess
+    line = f"{'role' if guess.is_role else 'class'} = {_text(guess.name)}  # "
+    others = f"; or is it {' or '.join(guess.others)}?" if guess.others else "; is this right?"
+    if draft.mixed and draft.class_by:
+        field, classes = draft.class_by
+        if draft.needs_class:
+            unlisted = [f"{_text(value)} ({rows:,})" for value, rows in draft.unlisted.items()]
+            more = f", and {len(unlisted) - VALUES_SHOWN} more" * (len(unlisted) > VALUES_SHOWN)
+            such = f": {', '.join(unlisted[:VALUES_SHOWN])}{more}" if unlisted else ""
+            yield f"{line}{EDIT}: of rows whose {_plain(field)} is not listed in class_by{such}"
+        otherwise = ', otherwise = "class"' * draft.needs_class
+        values = ", ".join(
+            f"{_key(_exactly(value))} = {_text(name)}" for value, name in classes.items()
+        )
+        yield (
+            f"class_by = {{ field = {_text(field)}, values = {{ {values} }}{otherwise} }}"
+            f"  # {EDIT}: is the class of each value right?"
+        )
+    elif not guess.reason:
+        yield (
+            f"{line}{EDIT}: unknown; write a class (or "
             'role = "buildings" or "streets" instead), or remove the layer'
         )
-    line = f"{'role' if guess.is_role else 'class'} = {_text(guess.name)}  # "
-    if guess.sure:
-        return line + _plain(guess.reason)
-    others = f"; or is it {' or '.join(guess.others)}?" if guess.others else "; is this right?"
-    return f"{line}{EDIT}: {_plain(guess.reason)}{others}"
+    elif guess.sure:
+        yield line + _plain(guess.reason)
+    else:
+        yield f"{line}{EDIT}: {_plain(guess.reason)}{others}"
 
 
 def _identifier(draft: _Draft) -> Iterator[str]:
@@ -353,7 +412,7 @@ def _filters(draft: _Draft) -> Iterator[str]:
     """Yield comments with fields of few values, and with a field that may contain the class."""
     rows = len(draft.sample.rows)
     sampled = "" if rows == draft.sample.info.rows else f" (seen in the first {rows:,} rows)"
-    if draft.class_by is not None:
+    if draft.class_by is not None and not draft.mixed:
         field, classes = draft.class_by
         (counts,) = (column.counts for column in draft.columns if column.name == field)
         values = ", ".join(

@@ -26,6 +26,7 @@ from semsig_gis.sources import (
     fold,
     keywords,
     open_table,
+    tagged_class,
     words_of,
 )
 
@@ -49,6 +50,7 @@ MIN_FILLED_SHARE = 0.1
 # Minimum share of rows with a value that names the guessed class.
 MIN_CLASS_SHARE = 0.5
 DATE = re.compile(r"\d{4}-\d\d-\d\d|\d\d[-/.]\d\d[-/.]\d{4}")
+VALUE_END = re.compile(r"\s*[,;:(|]|\s+-\s")
 LAT_LON = re.compile(r"\s*-?\d{1,2}\.\d+\s*,\s*-?\d{1,3}\.\d+\s*")
 
 
@@ -253,24 +255,42 @@ def _guesses_by_content(columns: Sequence[Column], rows: int) -> Iterator[ClassG
             yield ClassGuess(match.name, reason=f"from the field {column.name}")
 
 
-def guess_class_by(columns: Sequence[Column], class_name: str) -> tuple[str, dict[str, str]] | None:
-    """Return the field with most values that name other classes, and the class of each value."""
+def guess_class_by(
+    columns: Sequence[Column], class_name: str, *, sure: bool = True
+) -> tuple[str, dict[str, str]] | None:
+    """Return the field with most values that name other classes, and the class of each value.
+
+    If the class of the layer is `sure`, values need the words by which layers are recognised;
+    without that, tags of OpenStreetMap and names of classes count, too.
+    """
     fields = [
-        (
-            column.name,
-            {
-                value: match.name
-                for value in column.counts
-                if isinstance(value, str)
-                for match in keywords("classes").find(value)[:1]
-                if match.name != class_name
-            },
-        )
+        (column.name, _classes_of_values(column, sure=sure))
         for column in columns
         if column.is_categorical(MAX_CLASS_VALUES)
     ]
-    best = max(fields, key=lambda field: len(field[1]), default=None)
-    return best if best and best[1] else None
+
+    def others(field: tuple[str, dict[str, str]]) -> int:
+        return sum(name != class_name for name in field[1].values())
+
+    best = max(fields, key=others, default=None)
+    return best if best and others(best) else None
+
+
+def _classes_of_values(column: Column, *, sure: bool) -> dict[str, str]:
+    """Return the class of each value of a field that names one."""
+    classes = {}
+    for value in column.counts:
+        if not isinstance(value, str):
+            continue
+        names = [] if sure else [tagged_class(column.name, value)]
+        # What stands before a comma or parenthesis is the thing, as in "Street light (LED)".
+        for text in dict.fromkeys([value, VALUE_END.split(value)[0]]):
+            names += [match.name for match in keywords("classes").find(text)[:1] if not match.doubt]
+            named = [] if sure else keywords("class_names").find(text)[:1]
+            names += [match.name for match in named if match.words == " ".join(words_of(text))]
+        if name := next(filter(None, names), None):
+            classes[value] = name
+    return classes
 
 
 def guess_position(sample: LayerSample, columns: Sequence[Column]) -> tuple[str, ...]:

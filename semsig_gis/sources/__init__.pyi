@@ -21,6 +21,7 @@ from .class_keywords import families as families
 from .class_keywords import family_words as family_words
 from .class_keywords import keywords as keywords
 from .class_keywords import other_class_words as other_class_words
+from .class_keywords import tagged_class as tagged_class
 from .class_keywords import words_for as words_for
 from .class_keywords import words_of as words_of
 from .clip import BOX as BOX

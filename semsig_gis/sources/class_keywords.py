@@ -306,6 +306,12 @@ def class_codes(word: str, taxonomy: Taxonomy) -> tuple[int, ...]:
     return codes
 
 
+def tagged_class(key: str, value: str) -> str:
+    """Return the only class with a tag of OpenStreetMap; empty for none or several."""
+    names = _tagged_classes().get(f"{key}={value}", frozenset())
+    return next(iter(names)) if len(names) == 1 else ""
+
+
 SPOKEN = "said"
 """Key of words for classes in observations; layers are not recognised by them."""
 MEMBERS = "classes"

@@ -105,8 +105,10 @@ FILES: dict[str, dict[str, list[object]] | list[object] | str] = {
     "layer1.geojson": {"amenity": ["post_box"] * 3},
     "signalisation.gpkg": {"a": [1]},
     "stuff.gpkg": {"a": [1, 2]},
-    # A value names another class.
+    # Values name other classes: of most rows, of few, or not of all.
     "PlacesReserv.gpkg": {"Type": ["Livraison", "Taxi", "GIG/GIC"] * 3},
+    "Places_reserv.gpkg": {"Type": ["Livraison"] * 9 + ["Taxi"]},
+    "furniture.gpkg": {"Kind": ["Bench", "lamp", "Pole", "Thing", None, "Bench, red", "lamp"] * 2},
     # Ids are repeated, or the field has an unusual name.
     "trees.gpkg": {"code": ["a", "a", "b"], "x": [1, 2, 3]},
     "arbres.gpkg": {"height": [1.5, 2.5, 3.25], "kind": ["a", "a", "b"], "baumnr": [17, 18, 21]},
@@ -581,9 +583,9 @@ def test_class_is_guessed_by_name_then_values_then_fields(
 
 
 def test_field_with_values_of_other_classes_is_found() -> None:
-    others = "kind", {"Taxi": "taxi_station", "GIG/GIC": "disabled_bay"}
+    classes = {"Taxi": "taxi_station", "Livraison": "reserved_bay", "GIG/GIC": "disabled_bay"}
     kind = column("kind", *["Taxi", "Livraison", "GIG/GIC", "Autre"] * 3)
-    assert guess_class_by([kind], "reserved_bay") == others
+    assert guess_class_by([kind], "reserved_bay") == ("kind", classes)
     assert guess_class_by([column("kind", *["Taxi", "Autre"] * 3)], "taxi_station") is None
     assert guess_class_by([column("kind", "Taxi", "Bench")], "") is None  # each seen once
 
