@@ -13,10 +13,11 @@ from semsig_gis.core import InputError
 
 
 class Imported(TypedDict):
-    """The files, and the numbers of cells and street objects in them."""
+    """The files, the numbers of cells and street objects in them, and what was changed or lost."""
 
     database: str
     cells: int
+    notes: list[str]
     objects: NotRequired[str]
     street_objects: NotRequired[int]
 
@@ -69,7 +70,11 @@ class Import:
         for note in contents.notes:
             reporter.remark(note)
         cells = len(contents.database)
-        values: Imported = {"database": str(self.out), "cells": cells}
+        values: Imported = {
+            "database": str(self.out),
+            "cells": cells,
+            "notes": list(contents.notes),
+        }
         files = {"signature database": self.out}
         if self.objects is not None and contents.objects is not None:
             save_ground(self.objects, remark=reporter.remark)  # a GeoPackage has none

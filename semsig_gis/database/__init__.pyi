@@ -24,6 +24,7 @@ from .file import MANIFEST as MANIFEST
 from .file import Manifest as Manifest
 from .file import PartFile as PartFile
 from .file import PartitionedDatabase as PartitionedDatabase
+from .file import cells_checksum as cells_checksum
 from .file import database_of as database_of
 from .file import database_specs as database_specs
 from .file import digest as digest

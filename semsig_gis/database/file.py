@@ -281,6 +281,16 @@ def _as_array(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
     return column.combine_chunks()
 
 
+def cells_checksum(database: SignatureDatabase) -> str:
+    """Return 16 hexadecimal digits that change with any cell or signature."""
+    checksum = hashlib.blake2b(digest_size=8)
+    extents = [] if database.extent_units is None else [database.extent_units]
+    seen = (database.codes, database.bearing_units, database.distance_units, *extents)
+    for array in (database.columns, database.rows, database.offsets, *seen):
+        checksum.update(np.ascontiguousarray(array).data)
+    return checksum.hexdigest()
+
+
 def digest(*paths: Path) -> str:
     """Return the hexadecimal SHA-256 digest of the contents of files, in their order."""
     total = hashlib.sha256()

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from pyproj import CRS
@@ -108,6 +107,8 @@ def widest_street(streets: Path) -> float:
     """Return the largest half-width of the streets in metres, 0 if the file has none."""
     if HALF_WIDTH not in pq.read_schema(streets).names:
         return 0.0
+    import pandas as pd  # noqa: PLC0415 - 0.4 s
+
     table = pq.read_table(streets, columns=[HALF_WIDTH], **VERIFY_CHECKSUMS)
     # As `read_surroundings` reads them.
     widths = pd.to_numeric(table[HALF_WIDTH].to_pandas(), errors="coerce").to_numpy(np.float64)

@@ -40,6 +40,7 @@ from .runs import finish as finish
 from .runs import partial_folder as partial_folder
 from .runs import read_json as read_json
 from .runs import write_json as write_json
+from .sqlite import sqlite_fault as sqlite_fault
 from .text import MAX_TEXT_BYTES as MAX_TEXT_BYTES
 from .text import parse_json as parse_json
 from .text import read_text as read_text

@@ -11,10 +11,17 @@ import pyarrow as pa
 import shapely
 
 from semsig_gis.core import GEOMETRY
-from semsig_gis.database import CellTable, database_specs
+from semsig_gis.database import CellTable, cells_checksum, database_specs
 from semsig_gis.output.layers import LAYERS
 from semsig_gis.output.layers.columns import form_of
-from semsig_gis.output.layers.model import Display, Layer, group_means, table_layer
+from semsig_gis.output.layers.model import (
+    CHECKSUM,
+    EXPORTED,
+    Display,
+    Layer,
+    group_means,
+    table_layer,
+)
 from semsig_gis.output.layers.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
 
 if TYPE_CHECKING:
@@ -79,6 +86,7 @@ def cells_layer(
     step = database.grid.step
     crs = database.crs.to_json_dict()
     facts = {**database_specs(database), "crs": crs, "identifiability": None}
+    facts |= {EXPORTED: len(database), CHECKSUM: cells_checksum(database)}
     style = functools.partial(by_amount, geometry=geometry, size=step)
     styles = [style("Ambiguity", "type_group_size", AMBIGUITY, heading="cells like it")]
     if identifiability is not None:

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 
 ROWS_A_BLOCK = 1 << 16
+EXPORTED, CHECKSUM = "rows", "checksum"
+"""Keys of the facts of layers that are read back: number of rows, and `cells_checksum`."""
 GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
 
 

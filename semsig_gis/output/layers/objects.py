@@ -23,7 +23,7 @@ from semsig_gis.core import (
 from semsig_gis.objects import objects_specs
 from semsig_gis.output.layers import LAYERS
 from semsig_gis.output.layers.columns import form_of
-from semsig_gis.output.layers.model import Display, Layer
+from semsig_gis.output.layers.model import EXPORTED, Display, Layer
 from semsig_gis.output.layers.styles import by_class
 
 if TYPE_CHECKING:
@@ -101,7 +101,11 @@ def objects_layer(objects: StreetObjects) -> Layer:
         bounds=(*objects.xy.min(axis=0).tolist(), *objects.xy.max(axis=0).tolist()),
         read=read,
         licenses=tuple(map(str, objects.licenses)),
-        facts={**objects_specs(objects), "crs": objects.crs.to_json_dict()},
+        facts={
+            **objects_specs(objects),
+            "crs": objects.crs.to_json_dict(),
+            EXPORTED: len(objects),
+        },
         form=FORM,
         display=DISPLAY,
         styles=(by_class(objects.taxonomy, objects.class_counts),),

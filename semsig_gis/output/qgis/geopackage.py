@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,14 +30,14 @@ from semsig_gis.core import (
     Taxonomy,
     crs_label,
 )
-from semsig_gis.database import EXTENT_UNITS, EXTENTS, database_of
+from semsig_gis.database import EXTENT_UNITS, EXTENTS, cells_checksum, database_of
 from semsig_gis.evaluation import identifiability_of
 from semsig_gis.objects import objects_of
-from semsig_gis.storage import parse_json
+from semsig_gis.output.layers.model import CHECKSUM, EXPORTED
+from semsig_gis.storage import parse_json, sqlite_fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -66,7 +67,8 @@ class GeopackageContents(Displayed):
     identifiability : Identifiability or None
         The identifiability, if it was exported and its cells have not been changed.
     notes : tuple of str
-        Omitted contents and the reasons, one sentence each.
+        Omitted contents and the reasons, and how cells and objects differ from those that were
+        exported, one sentence each.
 
     Examples
     --------
@@ -126,6 +128,11 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
         what = "is a folder" if os.path.isdir(path) else "does not exist"  # noqa: PTH112
         raise DatabaseError(f"{path} {what}; give a GeoPackage that semsig export wrote.")
     notes: list[str] = []
+    if fault := sqlite_fault(Path(path)):
+        raise DatabaseError(
+            f"{path} is damaged, or was not written by semsig export ({fault}); export the "
+            "database again."
+        )
     try:
         names = pyogrio.list_layers(path)[:, 0].tolist()
         if CELLS not in names:
@@ -161,7 +168,12 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
                 )
             except DatabaseError as error:
                 notes.append(str(error))
-        objects = _read_objects(path) if OBJECTS in names else None
+        notes += _changes(path, specs, CELLS, len(database), checksum=cells_checksum(database))
+        objects = None
+        if OBJECTS in names:
+            objects, object_specs = _read_objects(path)
+            if EXPORTED in specs:
+                notes += _changes(path, object_specs, OBJECTS, len(objects))
     except (
         *(DataSourceError, DataLayerError, CRSError, pa.ArrowException),
         *(OSError, ValueError, LookupError, TypeError),
@@ -174,7 +186,27 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
     )
 
 
-def _read_objects(path: str | Path) -> StreetObjects:
+def _changes(
+    path: str | Path, specs: dict[str, Any], layer: str, rows: int, *, checksum: str | None = None
+) -> list[str]:
+    """Return a note on how a layer differs from what was exported; none if it is the same.
+
+    Rows may be deleted and changed on purpose, but not without a word.
+    """
+    if EXPORTED not in specs:
+        older = "was written by an older version, which did not count its rows"
+        return [f"{path} {older}, so it is not known whether some are lost"]
+    again = "if that is not on purpose, export the database again"
+    if lost := int(specs[EXPORTED]) - rows:
+        more = f"{lost:,} fewer" if lost > 0 else f"{-lost:,} more"
+        return [f"the layer {layer} of {path} has {rows:,} rows, {more} than exported; {again}"]
+    if checksum is not None and checksum != specs[CHECKSUM]:
+        return [f"the layer {layer} of {path} was changed after it was exported; {again}"]
+    return []
+
+
+def _read_objects(path: str | Path) -> tuple[StreetObjects, dict[str, Any]]:
+    """Return the street objects, and the specs of their layer."""
     specs, crs, fields = _read_specs(path, OBJECTS)
     table = _read_columns(path, OBJECTS, [name for name in OBJECT_COLUMNS if name in fields])
     columns = {name: table[name] for name in table.column_names}
@@ -184,7 +216,7 @@ def _read_objects(path: str | Path) -> StreetObjects:
     columns |= {name: pc.fill_null(columns[name], "") for name in (SOURCE, SOURCE_ID)}
     if pc.min(columns[COUNT]).as_py() < 1:
         raise ValueError("a count of objects is below 1")
-    return objects_of(pa.table(columns), specs, crs, path=path)
+    return objects_of(pa.table(columns), specs, crs, path=path), specs
 
 
 def _read_specs(path: str | Path, layer: str) -> tuple[dict[str, Any], CRS, list[str]]:

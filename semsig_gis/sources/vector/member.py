@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 import shutil
-import sqlite3
 import tempfile
 import weakref
 import zipfile
@@ -21,6 +19,7 @@ from semsig_gis.sources.vector.formats import (
     SQLITE,
     content_error,
 )
+from semsig_gis.storage import sqlite_fault
 
 if TYPE_CHECKING:
     from pyproj import CRS
@@ -127,19 +126,9 @@ class Member:
             raise content_error(self, start)
         if self.driver not in SQLITE or not isinstance(self.path, Path):
             return
-        # With the messages of GDAL, the readers of a damaged GeoPackage would crash.
-        address = f"{self.path.resolve().as_uri()}?mode=ro"
-        try:
-            with contextlib.closing(sqlite3.connect(address, uri=True)) as connection:
-                verdict = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
-        except UnicodeDecodeError:
-            verdict = "a name in it is not UTF-8 text"
-        except sqlite3.Error as error:
-            verdict = str(error)
-        if verdict != "ok":
+        if fault := sqlite_fault(self.file):
             raise SourceError(
-                f"{self.file} cannot be read ({' '.join(verdict.split())}); it may be damaged, so "
-                "download it again."
+                f"{self.file} cannot be read ({fault}); it may be damaged, so download it again."
             )
 
 

@@ -30,7 +30,7 @@ from hypothesis import strategies as st
 from machine import PATIENCE_S
 from map_pages import HOSTILE, hostile_database
 from pyproj import CRS
-from sentences import refused
+from sentences import assert_sentence, refused
 from small_city import chances_of, small_city, small_localization, small_location
 from worlds import CORNER, World, assert_same
 
@@ -555,6 +555,10 @@ def test_cells_deleted_and_objects_added_in_qgis_are_read(tmp_path: Path) -> Non
     assert_same(database.select(database.lengths >= 3), contents.database)
     assert contents.identifiability is None
     assert "other signatures" in contents.notes[0]
+    gone = int((database.lengths < 3).sum())
+    assert f"{gone:,} fewer than exported" in contents.notes[1]
+    assert "objects" in contents.notes[2]
+    assert "1 more than exported" in contents.notes[2]
     assert contents.objects is not None
     row = contents.objects.table.iloc[-1]
     assert (row["source"], row["source_id"], row["count"]) == ("", "", 1)
@@ -572,6 +576,40 @@ def test_geometry_in_the_type_of_geoarrow_is_read(tmp_path: Path) -> None:
         assert contents.objects is not None
         save_objects(contents.objects, tmp_path / "objects.parquet")
     assert len(layer) == len(open_objects(tmp_path / "objects.parquet")) == len(objects)
+
+
+def test_changed_cells_and_files_of_older_versions_are_noted(tmp_path: Path) -> None:
+    (database, objects), file = small_city(), tmp_path / "city.gpkg"
+    export_database(database, file, objects=objects)
+    execute(file, "UPDATE cells SET bearings = '1.00' WHERE length = 1")
+    (note,) = read_geopackage(file).notes
+    assert "the layer cells" in note
+    assert "was changed after it was exported" in note
+    execute(file, """UPDATE gpkg_metadata SET metadata = replace(metadata, 'key="rows"', '')""")
+    (note,) = read_geopackage(file).notes
+    assert "older version" in note
+
+
+def test_a_changed_bit_loses_no_cells_without_a_word(tmp_path: Path) -> None:
+    database, file = small_city()[0], tmp_path / "city.gpkg"
+    export_database(database, file)
+    with closing(sqlite3.connect(file)) as connection:
+        query = "SELECT rootpage FROM sqlite_master WHERE name = 'cells'"
+        ((page,),) = connection.execute(query)
+    intact = file.read_bytes()
+    start, detected = 4096 * (page - 1), 0
+    for place in range(45):  # the header of the page, and its first rows
+        changed = bytearray(intact)
+        changed[start + place] ^= 1 << place % 8
+        file.write_bytes(changed)
+        try:
+            contents = read_geopackage(file)
+        except DatabaseError as error:
+            assert_sentence(error, "city.gpkg", "damaged")
+            detected += 1
+        else:
+            assert contents.notes or len(contents.database) == len(database)
+    assert detected > 10
 
 
 def zero_pages(file: Path, start: int) -> None:
