@@ -186,7 +186,9 @@ def texts_of(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """Return a column of texts with an empty text for every null; other columns as they are."""
     if pa.types.is_null(column.type):
         column = column.cast(pa.string())
-    return pc.fill_null(column, "") if _IS_KIND["text"](column.type) else column
+    if not column.null_count or not _IS_KIND["text"](column.type):
+        return column  # without `fill_null`, which loads pandas
+    return pc.fill_null(column, "")
 
 
 SPEC_KEY = b"semsig"
