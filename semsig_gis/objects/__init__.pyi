@@ -17,7 +17,6 @@ from .guesses import LayerSample as LayerSample
 from .guesses import columns_of as columns_of
 from .guesses import guess_class as guess_class
 from .guesses import guess_class_by as guess_class_by
-from .guesses import guess_position as guess_position
 from .layers import LayerReport as LayerReport
 from .layers import Loaded as Loaded
 from .layers import LoadReport as LoadReport

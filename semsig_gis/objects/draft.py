@@ -8,7 +8,7 @@ import itertools
 import json
 import re
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,19 +33,19 @@ from semsig_gis.objects.guesses import (
     columns_of,
     guess_class,
     guess_class_by,
-    guess_position,
     sample_layers,
 )
 from semsig_gis.objects.layers import assemble, read_files
 from semsig_gis.sources import (
     ANY_VALUE,
     BETWEEN_SLASHES,
-    NO_GEOMETRY,
     WGS84,
     Condition,
     LayerSpec,
     built_in_taxonomy,
+    for_crs,
     load_catalog,
+    no_positions,
     off_the_globe,
     reader,
     words_of,
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import AnyCrs
     from semsig_gis.objects.guesses import Column, LayerSample
+    from semsig_gis.sources import PositionFields
 
 
 # Any projected CRS, to read coordinates unchanged.
@@ -83,7 +84,7 @@ class _Draft:
     guess: ClassGuess
     class_by: tuple[str, dict[str, str]] | None
     mixed: bool
-    position: tuple[str, ...]
+    positions: PositionFields | None
     crs: str | None
     crs_reason: str = ""
 
@@ -158,9 +159,10 @@ def draft_catalog(path: str | Path, *, crs: AnyCrs | None = None) -> str:
     """
     path = Path(path)
     items = sample_layers(path)
-    layers = [item for item in items if item.info.geometry != NO_GEOMETRY]
+    layers = [item for item in items if item.placed or item.positions]
     if not layers:
-        raise SourceError(f"{path} has no layer with positions; give a file that has one.")
+        fields = items[0].info.fields
+        raise SourceError(f"{path} has no layer with positions and {no_positions(fields)}.")
     stated = None if crs is None else crs_text(crs)
     drafts = [_draft(path, item, stated) for item in layers]
     lines = [
@@ -209,13 +211,6 @@ def _require_loads(text: str, path: Path) -> None:
 def _draft(path: Path, sample: LayerSample, crs: str | None) -> _Draft:
     columns = columns_of(sample)
     geometry = GEOMETRIES.get(sample.info.geometry.removeprefix("3D ").removeprefix("Multi"))
-    position = sample.coordinates if sample.placed else guess_position(sample, columns)
-    if not sample.placed and not position:
-        fields = ", ".join(column.name for column in columns)
-        raise SourceError(
-            f"{path} has no field that looks like a position, only {fields}; "
-            "give a file with coordinates."
-        )
     names = f"{path.stem} / {sample.info.name}"
     rows = len(sample.rows)
     guess = guess_class(names, columns, geometry=geometry, rows=rows)
@@ -225,9 +220,12 @@ def _draft(path: Path, sample: LayerSample, crs: str | None) -> _Draft:
     if not guess.name or (mixed and not guess.sure):  # a class of its own, named after the file
         name = re.sub(r"[^a-z0-9]+", "_", _snake(path.stem)).strip("_")
         guess = ClassGuess(name if name[:1].isalpha() else f"layer_{name}".rstrip("_"))
-    crs, crs_reason = _crs(path, sample, position, crs)
+    positions = sample.positions
+    if crs is not None and positions is not None:
+        positions = for_crs(positions, sample.rows, crs)
+    crs, crs_reason = _crs(path, sample, positions, crs)
     return _Draft(
-        path, sample, columns, geometry, guess, class_by, mixed, position, crs, crs_reason
+        path, sample, columns, geometry, guess, class_by, mixed, positions, crs, crs_reason
     )
 
 
@@ -244,31 +242,29 @@ def _is_mixed(
 
 
 def _crs(
-    path: Path, sample: LayerSample, position: tuple[str, ...], crs: str | None
+    path: Path, sample: LayerSample, positions: PositionFields | None, crs: str | None
 ) -> tuple[str | None, str]:
     """Return the CRS for the catalogue, None if the file states it, and a comment on it.
 
     CrsError if it is unknown; `crs` is that of a file that does not state one.
     """
     stated = sample.info.crs
-    if stated is not None and len(position) < 2:  # noqa: PLR2004 - not x and y
-        return (stated if sample.reader == VECTOR else None), ""
+    if sample.reader != VECTOR and (positions is None or stated is not None):
+        return None, ""  # degrees, by the rules of these formats, or what the file states
+    if stated is not None:
+        return stated, ""
     if crs is not None:
         return crs, ""
-    if sample.reader != VECTOR and len(position) < 2:  # noqa: PLR2004 - not x and y
-        return None, ""  # degrees, by the rules of these formats
+    if positions is not None and positions.crs is not None:
+        return positions.crs, "the file does not say; its coordinates are in the range of this one"
     # Read the coordinates in any CRS, to see whether they can be degrees.
-    x, y = position if len(position) == 2 else (None, None)  # noqa: PLR2004 - x and y
-    spec = LayerSpec(
-        name="draft",
-        class_name="",
-        layer=sample.info.name if sample.reader == VECTOR else None,
-        crs=PLANE,
-        x_field=x,
-        y_field=y,
-    )
-    (layer,) = reader(sample.reader)(path, [spec])
-    xy = shapely.get_coordinates(layer.table.geometry.dropna().array)
+    layer = sample.info.name if sample.reader == VECTOR else None
+    spec = LayerSpec(name="draft", class_name="", layer=layer, crs=PLANE)
+    if positions is not None:
+        x, y, whole, order = positions.x, positions.y, positions.field, positions.order
+        spec = replace(spec, x_field=x, y_field=y, geometry_field=whole, axis_order=order)
+    (raw,) = reader(sample.reader)(path, [spec])
+    xy = shapely.get_coordinates(raw.table.geometry.dropna().array)
     if 2 * np.count_nonzero(off_the_globe(xy, WGS84)) <= len(xy):
         return "EPSG:4326", "the file does not say; its coordinates could be degrees"
     raise CrsError(
@@ -382,7 +378,8 @@ def _identifier(draft: _Draft) -> Iterator[str]:
     for column in draft.columns:
         # Numbers with decimals are measurements, which are unique by chance.
         measured = any(str(value).count(".") == 1 for value in column.counts)
-        if column.unique and not measured and column.name not in draft.position:
+        used = draft.positions.names if draft.positions else ()
+        if column.unique and not measured and column.name not in used:
             name = _text(column.name)
             yield f"# id_field = {name}  # different in {where}; use it if it is an id"
             return
@@ -390,13 +387,17 @@ def _identifier(draft: _Draft) -> Iterator[str]:
 
 def _place(draft: _Draft) -> Iterator[str]:
     """Yield the lines with the fields of positions and the CRS."""
-    if len(draft.position) == 1:
-        (field,) = draft.position
-        yield f"aliases = {{ geo_point_2d = [{_text(field)}] }}  # latitude, longitude"
-    if len(draft.position) == 2:  # noqa: PLR2004 - x and y
-        x, y = draft.position
-        yield f"x_field = {_text(x)}"
-        yield f"y_field = {_text(y)}"
+    found = draft.positions
+    if found is not None:
+        questions = found.questions if found.sure else ("by their values only", *found.questions)
+        comment = f"  # {EDIT}: {_plain('; '.join(questions))}" if questions else ""
+        if found.field is not None:
+            yield f"geometry_field = {_text(found.field)}{comment}"
+            if found.order is not None:
+                yield f"axis_order = {_text(found.order)}"
+        else:
+            yield f"x_field = {_text(str(found.x))}{comment}"
+            yield f"y_field = {_text(str(found.y))}"
     if draft.crs is None:
         return
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import operator
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -14,14 +13,13 @@ from shapely.geometry.base import BaseGeometry
 from semsig_gis.core import SourceError, crs_label
 from semsig_gis.sources import (
     FORMATS,
-    LATITUDE_LIMIT,
-    LONGITUDE_LIMIT,
     NO_GEOMETRY,
     POINT,
     SHAPE,
     LayerInfo,
     ServiceRecord,
     decimal,
+    find_positions,
     first_rows,
     fold,
     keywords,
@@ -34,11 +32,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from semsig_gis.sources import Match
+    from semsig_gis.sources import Match, PositionFields
 
 VECTOR = "vector_file"
 # Files that may be a plain table of records, which GDAL cannot read or reads as text.
-TABLE_SUFFIXES = frozenset({".csv", ".gml", ".json", ".parquet"})
+TABLE_SUFFIXES = frozenset({".csv", ".geojson", ".gml", ".json", ".parquet"})
 SAMPLE_ROWS = 100_000
 ROLE_GEOMETRY = {"buildings": "polygon", "streets": "line"}
 # Maximum number of distinct values of a field that is offered as a filter.
@@ -51,22 +49,21 @@ MIN_FILLED_SHARE = 0.1
 MIN_CLASS_SHARE = 0.5
 DATE = re.compile(r"\d{4}-\d\d-\d\d|\d\d[-/.]\d\d[-/.]\d{4}")
 VALUE_END = re.compile(r"\s*[,;:(|]|\s+-\s")
-LAT_LON = re.compile(r"\s*-?\d{1,2}\.\d+\s*,\s*-?\d{1,3}\.\d+\s*")
 
 
 @dataclass(frozen=True, slots=True)
 class LayerSample:
     """A layer with the name of its reader and its first rows.
 
-    `placed` is whether the reader finds the positions by itself; `coordinates` are the two fields
-    of the positions, if it finds them in two fields.
+    `placed` is whether the rows have positions outside the fields, or in fields that the reader
+    knows; `positions` are the fields of the positions of others, if they have some.
     """
 
     reader: str
     info: LayerInfo
     rows: tuple[Mapping[str, Any], ...]
     placed: bool = True
-    coordinates: tuple[str, ...] = ()
+    positions: PositionFields | None = None
 
 
 def sample_layers(path: Path) -> tuple[LayerSample, ...]:
@@ -80,13 +77,14 @@ def sample_layers(path: Path) -> tuple[LayerSample, ...]:
     try:
         if suffix != ".parquet":
             layers = tuple(
-                LayerSample(VECTOR, info, rows, coordinates=coordinates)
-                for info, rows, coordinates in first_rows(path, limit=SAMPLE_ROWS)
+                LayerSample(VECTOR, info, rows, info.geometry != NO_GEOMETRY, positions)
+                for info, rows, positions in first_rows(path, limit=SAMPLE_ROWS)
             )
     except SourceError:
         if suffix not in TABLE_SUFFIXES:
             raise
-    if suffix in TABLE_SUFFIXES and all(item.info.geometry == NO_GEOMETRY for item in layers):
+    placed = any(item.placed or item.positions for item in layers)
+    if suffix in TABLE_SUFFIXES and not placed:
         return (_table_sample(path),)
     return layers
 
@@ -110,7 +108,9 @@ def _table_sample(path: Path) -> LayerSample:
     )
     position_fields = {fold(field) for field in table.fields} & {fold(SHAPE), fold(POINT)}
     kind = "wfs" if path.suffix.lower() == ".gml" else "opendatasoft"
-    return LayerSample(kind, info, rows, placed=table.has_geometry or bool(position_fields))
+    placed = any(record.geometry for record in first) or bool(position_fields)
+    found = None if placed else find_positions(table.fields, rows, subject=path.stem)
+    return LayerSample(kind, info, rows, placed, found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,18 +146,8 @@ class Column:
         )
 
     def meant_for(self, purpose: str) -> bool:
-        """Whether the field name is typical of a filter, identifier, row_number, x or y."""
+        """Whether the field name is typical of a filter, identifier or row_number."""
         return any(match.name == purpose for match in keywords("fields").find(self.name))
-
-    @property
-    def numeric(self) -> bool:
-        """Whether a value is a number."""
-        return any(_number(value) is not None for value in self.counts)
-
-    def within(self, limit: float) -> bool:
-        """Whether all numbers are from ``-limit`` to ``limit``."""
-        numbers = map(_number, self.counts)
-        return all(abs(number) <= limit for number in numbers if number is not None)
 
 
 def _is_name(value: object) -> bool:
@@ -291,33 +281,3 @@ def _classes_of_values(column: Column, *, sure: bool) -> dict[str, str]:
         if name := next(filter(None, names), None):
             classes[value] = name
     return classes
-
-
-def guess_position(sample: LayerSample, columns: Sequence[Column]) -> tuple[str, ...]:
-    """Return the field with ``lat, lon``, or the fields of x and y; empty if there are none."""
-    for name in sample.info.fields:
-        values = [row[name] for row in sample.rows if row.get(name) not in {None, ""}]
-        points = sum(isinstance(value, str) and bool(LAT_LON.fullmatch(value)) for value in values)
-        if values and 2 * points >= len(values):
-            return (name,)
-    numbers = [column for column in columns if column.numeric]
-    pairs = [
-        (x, y)
-        for x in numbers
-        for y in numbers
-        if x is not y and x.meant_for("x") and y.meant_for("y")
-    ]
-    best = max(pairs, key=_pair_rank, default=())
-    return tuple(column.name for column in best)
-
-
-def _pair_rank(pair: tuple[Column, Column]) -> tuple[bool, bool]:
-    """Criteria to rank a pair of coordinate columns: similar names, and values in degrees.
-
-    Names are similar if they differ in one word only.
-    """
-    x, y = pair
-    x_words, y_words = (words_of(column.name) for column in pair)
-    differences = sum(map(operator.ne, x_words, y_words))
-    similar = len(x_words) == len(y_words) and differences == 1
-    return similar, x.within(LONGITUDE_LIMIT) and y.within(LATITUDE_LIMIT)

@@ -93,6 +93,10 @@ from .paths import FILE_SUFFIXES as FILE_SUFFIXES
 from .paths import files_in as files_in
 from .paths import is_geodatabase as is_geodatabase
 from .paths import require_file as require_file
+from .positions import PositionFields as PositionFields
+from .positions import find_positions as find_positions
+from .positions import for_crs as for_crs
+from .positions import no_positions as no_positions
 from .probe import probe_file as probe_file
 from .readers.mapillary import MOST_FEATURES as MOST_FEATURES
 from .registry import READERS as READERS

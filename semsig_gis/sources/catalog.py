@@ -40,7 +40,9 @@ if TYPE_CHECKING:
 
 
 # TOML files in the same folder that are not catalogues: classes, keywords and more.
-NO_CATALOGS = frozenset({"drift", "geofabrik", "keywords", "phrases", "street_words", "taxonomy"})
+NO_CATALOGS = frozenset(
+    {"drift", "geofabrik", "keywords", "phrases", "position_words", "street_words", "taxonomy"}
+)
 PAPER_CLASSES = 11
 MEASURES = ("range_m", "height_m", "height_sigma")
 MAX_MERGING_M = 100.0

@@ -9,17 +9,28 @@ import io
 import itertools
 import re
 import unicodedata
+from collections import Counter
 from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from charset_normalizer import from_bytes
 
 from semsig_gis.core import SourceError
+from semsig_gis.sources.position_values import WELL_KNOWN
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-SEPARATORS = ";,\t"
+SEPARATORS = ";,\t|"
+BLANK = " "  # one or several between two columns, if no other separator is there
+# The first line that Excel writes and reads.
+STATED_SEPARATOR = re.compile(r'\ufeff?"?sep=(.)"?\s*', re.IGNORECASE)
+# Number of lines that show where the table begins.
+FIRST_LINES = 100
+MOST_SHOWN = 40
+QUOTED = re.compile(r'["{}=]|\(-?\d|\d\)')  # not in names
+# Values that are no names: a number with decimals, an angle, and a long whole number.
+NO_NAME = re.compile(r"\s*[+-]?\d+(?:[.,]\d+)(?:\D.*)?|\s*\d+\s*[°º].*|\s*\d{5,}\s*", re.DOTALL)
 # A geometry may be longer than the 128 KiB that Python's reader allows by default.
 MOST_VALUE_CHARACTERS = 2**24
 READ_BYTES = 2**20
@@ -47,7 +58,8 @@ class CsvFile:
     """A CSV file with its encoding and its possible separators.
 
     `what` is its name in messages, `errors` the error handler for bytes that are not text, `notes`
-    are remarks for the user. `layouts` has the stripped column names by separator.
+    are remarks for the user. `layouts` has the stripped column names by separator, the best first,
+    and `starts` the number of lines before them.
     """
 
     open: Callable[[], IO[bytes]]
@@ -55,12 +67,13 @@ class CsvFile:
     encoding: str
     errors: str
     layouts: Mapping[str, tuple[str, ...]]
+    starts: Mapping[str, int]
     notes: tuple[str, ...] = ()
 
     @property
     def separator(self) -> str:
         """The separator that gives the most columns."""
-        return max(self.layouts, key=lambda separator: len(self.layouts[separator]))
+        return next(iter(self.layouts))
 
     def rows(self, separator: str) -> Iterator[dict[str, str | None] | str]:
         """Yield every row as values by column name, or the text of its error.
@@ -75,16 +88,24 @@ class CsvFile:
                 yield f"has {len(values)} values, and the header has {len(names)} names"
             elif values:
                 missing = [None] * (len(names) - len(values))
-                # Of columns with the same name, the first counts.
-                pairs = zip(names, [*values[: len(names)], *missing], strict=True)
-                yield dict(reversed(list(pairs)))
+                # Of columns with the same name, the first that is not blank counts.
+                row: dict[str, str | None] = {}
+                for name, value in zip(names, [*values[: len(names)], *missing], strict=True):
+                    if not (row.get(name) or "").strip():
+                        row[name] = value if value is not None else row.get(name)
+                yield row
+
+    def text(self) -> IO[str]:
+        """Open the file as text, with its ends of lines."""
+        return io.TextIOWrapper(self.open(), self.encoding, self.errors, newline="")
 
     def _values(self, separator: str) -> Iterator[list[str] | str]:
         before = csv.field_size_limit(MOST_VALUE_CHARACTERS)
         try:
-            with io.TextIOWrapper(self.open(), self.encoding, self.errors, newline="") as stream:
+            with self.text() as stream:
                 # Strict, because an unclosed quote would make all rows after it one value.
-                rows = csv.reader(stream, delimiter=separator, strict=True)
+                lines = itertools.islice(stream, self.starts[separator], None)
+                rows = _parsed(lines, separator)
                 while True:
                     try:
                         yield next(rows)
@@ -102,19 +123,122 @@ def open_csv(open_: Callable[[], IO[bytes]], what: str) -> CsvFile:
     """Detect encoding and separators of a CSV file.
 
     Without a byte order mark the encoding is UTF-8 if the text is valid, else the guess of
-    charset-normalizer. SourceError if the file is empty, not text, or its encoding is unknown.
+    charset-normalizer. SourceError if the file is empty, not text, has no header, or its encoding
+    is unknown.
     """
     encoding, errors, notes = _encoding(open_, what)
     layouts: dict[str, tuple[str, ...]] = {}
-    file = CsvFile(open_, what, encoding, errors, layouts, notes)
-    for separator in SEPARATORS:
-        names = next(file._values(separator), [])  # noqa: SLF001 - of this class
-        layouts[separator] = () if isinstance(names, str) else tuple(map(str.strip, names))
+    starts: dict[str, int] = {}
+    file = CsvFile(open_, what, encoding, errors, layouts, starts, notes)
+    try:
+        with file.text() as stream:
+            lines = [*itertools.islice(stream, FIRST_LINES)]
+    except UnicodeDecodeError as error:
+        raise _unknown_encoding(what) from error
+    stated = STATED_SEPARATOR.fullmatch(lines[0]) if lines else None
+    marks = stated[1] if stated else SEPARATORS
+    first = int(bool(stated))
+    plain = [_layout(lines, mark, first) for mark in marks]
+    if not any(item.fits for item in plain):
+        # Titles and comments may stand before the table, and blanks between its columns.
+        plain = [_layout(lines, mark, first, titles=True) for mark in marks]
+        blanks = _layout(lines, BLANK, first, titles=True)
+        if blanks.fits and not any(item.fits for item in plain):
+            plain = [blanks]
+    for item in sorted(plain, key=lambda item: (not item.fits, -len(item.names), item.separator)):
+        layouts[item.separator], starts[item.separator] = item.names, item.start
     if not any(name for names in layouts.values() for name in names):
         raise SourceError(
             f"{what} is empty; give a file that begins with the names of its columns."
         )
+    _require_names(file)
     return file
+
+
+def _require_names(file: CsvFile) -> None:
+    """Raise SourceError if values stand in place of the names of columns."""
+    names = file.layouts[file.separator]
+    values = [name for name in names if NO_NAME.fullmatch(name) or WELL_KNOWN.fullmatch(name)]
+    if len(values) >= 2 or any(not value.replace(".", "").isdecimal() for value in values):  # noqa: PLR2004 - a pair
+        places = ["lon", "lat", *(f"column{number}" for number in range(3, len(names) + 1))]
+        example = file.separator.join(places[: len(names)])
+        raise SourceError(
+            f"{file.what} has no header, for its first line holds values such as "
+            f"{values[0][:MOST_SHOWN]!r}; write the names of its columns in a line before it, such "
+            f"as {example!r}."
+        )
+
+
+class _Layout(NamedTuple):
+    """The header of a table; `fits` is whether most rows have as many values as it has names."""
+
+    separator: str
+    start: int
+    names: tuple[str, ...]
+    fits: bool
+
+
+def _layout(lines: Sequence[str], separator: str, first: int, *, titles: bool = False) -> _Layout:
+    """Return the layout from line `first` on; with `titles`, lines before the header may be others.
+
+    These have at most half as many cells as the table, or are comments.
+    """
+    rows = [
+        row for row in _rows(lines, separator) if row[0] >= first and any(map(str.strip, row[1]))
+    ]
+    if not rows:
+        return _Layout(separator, first, (), fits=False)
+    widths = Counter(len(_trimmed(row)) for _, row in rows)
+    width = max(widths, key=lambda size: (widths[size], size))
+    start, names = rows[0]
+    for number, row in rows if titles else ():
+        cells = [cell for cell in row if cell.strip()]
+        comment = cells[0].lstrip().startswith("#") and len(_trimmed(row)) < width
+        if 2 * len(cells) > width and not comment:
+            if not any(_is_value(cell, blanks=separator == BLANK) for cell in cells):
+                start, names = number, row
+            break
+    if names[0].lstrip().startswith("#") and len(names) > 1:  # a comment for some programs
+        first_name = names[0].strip().removeprefix("#")
+        names = [first_name, *names[1:]] if first_name else names[1:]
+    others = [len(_trimmed(row)) for number, row in rows if number > start]
+    same = sum(size == len(_trimmed(names)) for size in others)
+    need = len(others) if separator == BLANK else len(others) / 2
+    fits = len(names) > 1 and same >= need
+    return _Layout(separator, start, tuple(name.strip() for name in names), fits)
+
+
+def _is_value(cell: str, *, blanks: bool) -> bool:
+    """Whether a cell is a value; with `blanks` between the columns, names have no digits."""
+    if blanks and any(map(str.isdecimal, cell)):
+        return True
+    return bool(NO_NAME.fullmatch(cell) or QUOTED.search(cell) or WELL_KNOWN.fullmatch(cell))
+
+
+def _trimmed(row: Sequence[str]) -> Sequence[str]:
+    """Return a row without blank cells at its end."""
+    size = max((number for number, cell in enumerate(row, 1) if cell.strip()), default=0)
+    return row[:size]
+
+
+def _rows(lines: Sequence[str], separator: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the readable rows of lines, each with the number of lines before it."""
+    reader = _parsed(lines, separator)
+    while True:
+        number = reader.line_num
+        try:
+            yield number, next(reader)
+        except StopIteration:
+            return
+        except csv.Error:
+            continue
+
+
+def _parsed(lines: Iterable[str], separator: str) -> Any:  # noqa: ANN401 - a type without name
+    """Return the reader of lines."""
+    if separator == BLANK:
+        lines = (re.sub(r"[ \t]+", BLANK, line.strip()) for line in lines)
+    return csv.reader(lines, delimiter=separator, strict=True)
 
 
 def _encoding(open_: Callable[[], IO[bytes]], what: str) -> tuple[str, str, tuple[str, ...]]:

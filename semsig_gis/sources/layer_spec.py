@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 GeometryKind = Literal["point", "line", "polygon"]
 ElementKind = Literal["node", "way", "relation"]
 Role = Literal["objects", "buildings", "streets"]
+AxisOrder = Literal["lat_lon", "lon_lat"]
 Derivation = Literal["junctions", "dead_ends", "building_corners", "gaps"]
 DERIVED: dict[Derivation, tuple[str, ...]] = {
     "junctions": ("t_junction", "crossroads", "large_junction", "roundabout"),
@@ -187,7 +188,12 @@ class LayerSpec:
     rows : tuple of (int, int), optional
         Expected minimum and maximum number of rows.
     x_field, y_field : str, optional
-        Coordinate columns of a CSV file.
+        Fields of the coordinates (longitude and latitude, or easting and northing) of a table.
+    geometry_field : str, optional
+        Field of a table that holds the whole position: well-known text or binary, GeoJSON, latitude
+        and longitude, and other notations.
+    axis_order : {"lat_lon", "lon_lat"}, optional
+        Order of two numbers in `geometry_field`, if they do not show it.
     aliases : tuple of (str, tuple of str)
         Fields and their names in other editions of the file (Opendatasoft only).
     dataset : str, optional
@@ -241,6 +247,8 @@ class LayerSpec:
     rows: Annotated[tuple[_Count, _Count], Parsed(_ordered), Accepts("[least, most]")] | None = None
     x_field: str | None = None
     y_field: str | None = None
+    geometry_field: str | None = None
+    axis_order: AxisOrder | None = None
     aliases: Annotated[tuple[tuple[str, tuple[str, ...]], ...], pairs(Texts)] = ()
     unique_id: Flag = False
     dataset: str | None = None
@@ -314,6 +322,12 @@ class LayerSpec:
         self._check_roles()
         if self.unique_id and self.id_field is None:
             raise CatalogError("unique_id needs an id_field; name the field of the ids.")
+        if self.geometry_field is not None and (self.x_field or self.y_field):
+            raise CatalogError(
+                "the position is in geometry_field or in x_field and y_field; remove one of them."
+            )
+        if self.axis_order is not None and self.geometry_field is None:
+            raise CatalogError("axis_order needs a geometry_field; name the field of the position.")
         if not self.files and self.dataset is None:
             raise CatalogError("files = [] names no file; write file names or patterns.")
 

@@ -31,7 +31,6 @@ from semsig_gis.objects import (
     draft_catalog,
     guess_class,
     guess_class_by,
-    guess_position,
     read_files,
 )
 from semsig_gis.objects import (
@@ -537,13 +536,11 @@ def test_identifiers_and_filters_are_distinguished(
         (["filter"], ["TYPE_D_OPÉ", "Kind"]),
         (["identifier"], ["IDBASE", "cod_ouvrag"]),
         (["row_number"], ["OBJECTID_1"]),
-        (["x"], ["POINT_X", "Longitude"]),
-        (["y"], ["lat"]),
         ([], ["N° Voie", "LONGUEUR", "latin"]),
     ],
 )
 def test_purpose_of_a_field_is_recognised_by_its_name(purpose: list[str], names: list[str]) -> None:
-    purposes = ("filter", "identifier", "row_number", "x", "y")
+    purposes = ("filter", "identifier", "row_number")
     for name in names:
         fits = [item for item in purposes if Column(name, Counter(), 0).meant_for(item)]
         assert fits == purpose, name
@@ -588,29 +585,6 @@ def test_field_with_values_of_other_classes_is_found() -> None:
     assert guess_class_by([kind], "reserved_bay") == ("kind", classes)
     assert guess_class_by([column("kind", *["Taxi", "Autre"] * 3)], "taxi_station") is None
     assert guess_class_by([column("kind", "Taxi", "Bench")], "") is None  # each seen once
-
-
-@pytest.mark.parametrize(
-    ("rows", "expected"),
-    [
-        ([{"place": "48.85, 2.35"}, {"place": None}], ("place",)),
-        ([{"place": "rue 1, 2"}], ()),
-        ([{"x": 1, "y": 2}], ("x", "y")),
-        ([{"lng": "here", "lat": "there"}], ()),
-        ([{"x": 1}], ()),
-        ([{"Coord_X": "770000,5", "Coord_Y": "6 280 000,5"}], ("Coord_X", "Coord_Y")),
-        ([{"X_L93": 770000, "Y_L93": 6280000}], ("X_L93", "Y_L93")),
-        ([{"lon_wgs84": 2.5, "lat_wgs84": 48.5}], ("lon_wgs84", "lat_wgs84")),
-        ([{"X_L93": 7e5, "lat": 48, "Y_L93": 6e6, "lon": 2}], ("lon", "lat")),
-        ([{"x_old": 1, "lat_new": 48, "y_old": 2, "lon_new": 2}], ("x_old", "y_old")),
-        ([{"lon": "?", "lat": 1}, {"lon": 2.5, "lat": 48}], ("lon", "lat")),
-    ],
-)
-def test_position_fields_of_a_table_are_guessed(
-    rows: list[dict[str, Any]], expected: tuple[str, ...]
-) -> None:
-    table = sample(*rows)
-    assert guess_position(table, columns_of(table)) == expected
 
 
 CUSTOM_CRS = "+proj=laea +lat_0=43.6 +lon_0=3.88 +datum=WGS84 +units=m"

@@ -107,7 +107,7 @@ def test_geometry_in_well_known_text(tmp_path: Path, read: Read, name: str) -> N
     rows = "".join(f'{number};"{text}"\n' for number, text in enumerate(SHAPES))
     layer = read(f"id;{name}\n{rows}99;here\n")
     assert [shape and shape.wkt for shape in layer.table.geometry] == list(SHAPES.values())
-    assert layer.errors == (f"row 8: {name.strip()} 'here' is not well-known text",)
+    assert layer.errors == (f"row 8: {name.strip()} 'here' is not a position",)
     (info,) = list_layers(tmp_path / "a.csv")
     assert (info.geometry, info.rows, info.crs) == ("Unknown", 8, "EPSG:4326")
 

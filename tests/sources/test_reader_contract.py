@@ -414,7 +414,7 @@ WRONG_FILES: list[tuple[str, str, bytes, str]] = [
     ("opendatasoft", "a.json", b"[1, 2]", "no records"),
     ("opendatasoft", "a.json", b'[{"a": "\xe9"}]', "is not UTF-8 text"),
     ("opendatasoft", "a.csv", b"\xef\xbb\xbf \n", "is empty"),
-    ("opendatasoft", "a.csv", b"a;b\n1;2\n", "geo_point_2d"),
+    ("opendatasoft", "a.csv", b"a;b\n1;2\n", "geometry_field"),
     ("opendatasoft", "a.png", b"\x89PNG\r\n\x1a\n\0\0", "unknown encoding"),
     ("opendatasoft", "a.gpkg", b"SQLite", "a.gpkg"),
     ("opendatasoft", "a.parquet", b"PAR1" + bytes(100), "whole Parquet"),

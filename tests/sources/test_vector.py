@@ -447,7 +447,7 @@ def test_csv_rows_without_numbers_are_errors(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("what", "error", "words"),
     [
-        ({}, SourceError, ["x_field and y_field; its columns are ident, place"]),
+        ({}, SourceError, ["only ident, place", "x_field", "y_field", "geometry_field"]),
         ({"x_field": "plase", "y_field": "place"}, CatalogError, ["'plase'", "is 'place'"]),
         ({"x_field": "place", "y_field": "placed"}, CatalogError, ["'placed'", "is 'place'"]),
         ({"x_field": "place"}, CatalogError, ["only one of x_field and y_field"]),

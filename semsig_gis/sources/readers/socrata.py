@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources.csv_layer import known_coordinates
+from semsig_gis.sources.positions import find_positions
 from semsig_gis.sources.services.fetch import service
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field
 from semsig_gis.sources.services.pages import (
@@ -100,7 +100,8 @@ def _coordinates(client: Client, fields: list[str]) -> tuple[str | None, str | N
     if layer.x_field and layer.y_field:
         x, y = (find_field(name, layer, fields) for name in (layer.x_field, layer.y_field))
         return x, y
-    return known_coordinates(fields)
+    found = find_positions(fields, ())
+    return (found.x, found.y) if found else (None, None)
 
 
 def _where(

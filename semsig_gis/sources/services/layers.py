@@ -3,34 +3,41 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+import itertools
 import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
 import shapely
-import shapely.geometry
-from shapely.errors import ShapelyError
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources.csv_layer import SHAPE_NAMES, known_coordinates, known_field
-from semsig_gis.sources.numbers import decimal
+from semsig_gis.sources.position_names import LAT_LON
+from semsig_gis.sources.position_values import locate
+from semsig_gis.sources.positions import (
+    SAMPLE_ROWS,
+    PlaceReader,
+    PositionFields,
+    find_positions,
+    no_positions,
+    stated_fields,
+    uncertain_positions,
+)
 from semsig_gis.sources.rows import WGS84, BadFeatureError, LayerBuilder
-from semsig_gis.sources.services.table import open_table
+from semsig_gis.sources.services.table import ServiceRecord, open_table
 from semsig_gis.sources.vector import file as vector_file
-from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
+
+    from pyproj import CRS
 
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Fetched
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Position
-    from semsig_gis.sources.services.table import ServiceRecord, ServiceTable
+    from semsig_gis.sources.services.table import ServiceTable
 
 
 def fold(name: str) -> str:
@@ -61,6 +68,7 @@ def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
         width_field=spec.width_field and own(spec.width_field),
         name_field=spec.name_field and own(spec.name_field),
         group_field=spec.group_field and own(spec.group_field),
+        geometry_field=spec.geometry_field and own(spec.geometry_field),
         height_field=spec.height_field and own(spec.height_field),
         levels_field=spec.levels_field and own(spec.levels_field),
         texts=tuple((column, own(field)) for column, field in spec.texts),
@@ -81,122 +89,77 @@ class PositionReader:
     """Reads the positions of the records of a table; SourceError if it has no field for them.
 
     The field of the shape goes first, because its axis order is certain; then the geometry outside
-    the fields, the field of the point, which is ``lat, lon``, and two fields of coordinates.
+    the fields, the field of the point, which is ``lat, lon``, and the fields that the catalogue
+    names. If it names none that the file has, they are found by names and values.
     """
 
     def __init__(self, spec: LayerSpec, table: ServiceTable, *, where: str) -> None:
         def own(name: str | None) -> str | None:
             return name and find_field(name, spec, table.fields)
 
-        self._shape, self._point = own(SHAPE), own(POINT)
-        self._x, self._y = own(spec.x_field), own(spec.y_field)
-        if not (spec.x_field or self._shape or self._point or table.has_geometry):
-            # The catalogue names no field of the file: try common names.
-            self._x, self._y = known_coordinates(table.fields)
-            self._shape = None if self._x else known_field(SHAPE_NAMES, table.fields)
-        columns = (self._shape, self._point, self._x, self._y)
-        self.fields = tuple(field for field in columns if field is not None)
-        coordinates = self._x and self._y
-        if not (self._shape or self._point or coordinates or table.has_geometry or table.empty):
-            raise SourceError(
-                f"{where} has no position: none of its fields {', '.join(table.fields)} is "
-                f"{SHAPE} or {POINT}; name the one that is, as an alias in the catalogue."
+        known = [
+            PositionFields(field=field, order=order)
+            for field, order in ((own(SHAPE), None), (own(POINT), LAT_LON))
+            if field is not None
+        ]
+        shape = [fields for fields in known if fields.field == own(SHAPE)]
+        x, y, whole = (own(name) for name in (spec.x_field, spec.y_field, spec.geometry_field))
+        stated = None
+        # A file may lack the fields that the catalogue names if it has a shape, or no rows.
+        if (x and y) or whole or not (known or table.has_geometry or table.empty):
+            own_spec = dataclasses.replace(
+                spec,
+                x_field=x or spec.x_field,
+                y_field=y or spec.y_field,
+                geometry_field=whole or spec.geometry_field,
             )
+            stated = stated_fields(own_spec, table.fields, where=where)
+        self._shape = [PlaceReader(fields, where) for fields in shape]
+        self._others = [PlaceReader(fields, where) for fields in known if fields not in shape]
+        self._others += [PlaceReader(stated, where)] if stated else []
+        self.notes: tuple[str, ...] = ()
+        if not (stated or known or table.empty):
+            found = self._found(table, where)
+            self._others += [PlaceReader(found, where)] if found else []
+            self.notes = found.questions if found else ()
+        readers = (*self._shape, *self._others)
+        self.fields = tuple(name for reader in readers for name in reader.fields.names)
+
+    @staticmethod
+    def _found(table: ServiceTable, where: str) -> PositionFields | None:
+        """Return the fields of positions by a sample; None if geometries are outside the fields."""
+        records = (item for item in table.records(table.fields) if isinstance(item, ServiceRecord))
+        sample = [*itertools.islice(records, SAMPLE_ROWS)]
+        if any(record.geometry for record in sample):
+            return None
+        found = find_positions(table.fields, [record.values for record in sample])
+        if found is None and not table.has_geometry:
+            raise SourceError(f"{where} {no_positions(table.fields)}.")
+        if found is not None and not found.sure:
+            raise SourceError(f"{where} {uncertain_positions(found)}.")
+        return found
+
+    @property
+    def crs(self) -> CRS | None:
+        """The CRS that the positions state, or None."""
+        stated = (reader.crs for reader in (*self._shape, *self._others))
+        return next((crs for crs in stated if crs is not None), None)
 
     def position(self, record: ServiceRecord) -> Position:
         """Return the position of a record, or None; BadFeatureError if it is invalid."""
-        values = record.values
         if isinstance(record.geometry, BadFeatureError):
             raise record.geometry
-        if self._shape is not None:
-            shape = _shape(values.get(self._shape))
-            if shape is not None:
+        for reader in self._shape:
+            if (shape := reader.read(record.values)) is not None:
                 return shape
         if record.geometry is not None:
-            return _shape(record.geometry)
-        if self._point is not None:
-            point = _point(values.get(self._point))
-            if point is not None:
-                return point
-        if self._x is None or self._y is None:
-            return None
-        both = (values.get(self._x), values.get(self._y))
-        if all(value is None or value == "" for value in both):
-            return None
-        try:
-            x, y = (decimal(v) if isinstance(v, str) else float(v) for v in both)  # type: ignore[arg-type]
-        except (TypeError, ValueError) as error:
-            raise BadFeatureError(
-                f"its {self._x} {both[0]!r} and {self._y} {both[1]!r} are not two numbers"
-            ) from error
-        return x, y
-
-
-def _shape(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
-    """Return a geometry from GeoJSON, Esri's JSON (also as text), WKT, WKB or a geometry."""
-    if value is None or value == "" or isinstance(value, shapely.Geometry):
-        return value or None
-    try:
-        return _parse_shape(value)
-    except (AttributeError, LookupError, TypeError, ValueError, ShapelyError) as error:
-        raise BadFeatureError(f"its shape {_shown(value)} is not a geometry") from error
-
-
-def _parse_shape(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
-    if isinstance(value, bytes):
-        return shapely.from_wkb(value)
-    if isinstance(value, str) and value.lstrip()[:1].isalpha():
-        return shapely.from_wkt(value)
-    geometry = parse_json(value) if isinstance(value, str) else value
-    if "type" not in geometry:
-        return _point(geometry) if "latitude" in geometry else esri_shape(geometry)
-    if geometry["type"] == "Feature":
-        geometry = geometry["geometry"]
-    if geometry is None:
-        return None
-    if geometry["type"] == "Point" and geometry["coordinates"]:
-        x, y = geometry["coordinates"][:2]
-        return float(x), float(y)
-    with np.errstate(invalid="ignore"):  # all geometries are checked for NaN later
-        return shapely.geometry.shape(geometry)
-
-
-def esri_shape(geometry: Mapping[str, Any]) -> Position:
-    """Return a geometry from JSON of the ArcGIS REST API; a ring inside another is a hole."""
-    if "x" in geometry:
-        x, y = (math.nan if value is None else float(value) for value in map(geometry.get, "xy"))
-        return None if math.isnan(x) and math.isnan(y) else (x, y)
-    if "points" in geometry:
-        return shapely.MultiPoint([point[:2] for point in geometry["points"]])
-    parts = geometry["paths"] if "paths" in geometry else geometry["rings"]
-    lines = shapely.MultiLineString([[point[:2] for point in part] for part in parts])
-    return lines if "paths" in geometry else shapely.build_area(lines) or None
-
-
-def _point(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
-    """Return a point from text ``lat, lon``, a list of both, a dict, GeoJSON or WKB."""
-    if value is None or (isinstance(value, str) and not value.strip()):
-        return None
-    if isinstance(value, bytes) or (isinstance(value, dict) and "type" in value):
-        return _shape(value)
-    try:
-        if isinstance(value, dict):
-            if "longitude" in value:
-                value = {"lon": value["longitude"], "lat": value["latitude"]}
-            if value["lon"] is None and value["lat"] is None:
-                return None
-            return float(value["lon"]), float(value["lat"])
-        lat, lon = value.strip().strip("()").split(",") if isinstance(value, str) else value
-        return float(lon), float(lat)
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise BadFeatureError(
-            f"its point {_shown(value)} is not a latitude and a longitude"
-        ) from error
-
-
-def _shown(value: object) -> str:
-    text = value if isinstance(value, str) else repr(value)
-    return repr(text if len(text) <= 60 else f"{text[:60]}...")  # noqa: PLR2004 - fits a line
+            try:
+                located = locate(record.geometry)
+            except BadFeatureError as error:
+                raise BadFeatureError(f"its geometry {error}") from error
+            return located and located.position
+        places = (reader.read(record.values) for reader in self._others)
+        return next((place for place in places if place is not None), None)
 
 
 # Files that other programs make from the data of a service.
@@ -289,11 +252,12 @@ def _read_table(
             "export the whole dataset instead"
         )
         notes += (rest,)
-    implicit = table.crs is None
-    raw = (
-        builder.layer(table.crs or WGS84, implicit=implicit, requested=crs, notes=notes)
-        for builder, _ in layers
-    )
+    raw = []
+    for builder, positions in layers:
+        stated = table.crs or positions.crs
+        more = (*notes, *positions.notes)
+        implicit = stated is None
+        raw.append(builder.layer(stated or WGS84, implicit=implicit, requested=crs, notes=more))
     return tuple(
         dataclasses.replace(layer, spec=spec) for layer, spec in zip(raw, specs, strict=True)
     )

@@ -16,7 +16,15 @@ import numpy as np
 
 from semsig_gis.core import SourceError, UnknownNameError, crs_label, nearest_name
 from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
-from semsig_gis.sources.rows import LayerBuilder, choose_crs, fits_the_globe
+from semsig_gis.sources.positions import (
+    SAMPLE_ROWS,
+    PlaceReader,
+    find_positions,
+    no_positions,
+    stated_fields,
+    uncertain_positions,
+)
+from semsig_gis.sources.rows import BadFeatureError, LayerBuilder, choose_crs, fits_the_globe
 from semsig_gis.sources.vector import by_pyogrio
 from semsig_gis.sources.vector.by_pyogrio import describe, first_rows_of, layer_names, read_whole
 from semsig_gis.sources.vector.contents import members
@@ -31,7 +39,8 @@ if TYPE_CHECKING:
     from semsig_gis.sources.csv_layer import CsvTable
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
-    from semsig_gis.sources.rows import Rows
+    from semsig_gis.sources.positions import PositionFields
+    from semsig_gis.sources.rows import Position, Rows
     from semsig_gis.sources.vector.member import LayerDescription, Member
 
 
@@ -108,11 +117,57 @@ def read_layer(
     if (csv := _csv(member, spec, where=where)) is not None:
         return read_csv_layer(csv, spec, filters=filters, crs=crs, where=where)
     layer = describe(member)
-    if layer.geometry == NO_GEOMETRY:
-        raise SourceError(f"{where} has no geometry; give the layer that contains the positions.")
     builder = LayerBuilder(spec, layer.fields, filters=filters, where=where)
+    table = layer.geometry == NO_GEOMETRY or len(layer.empty) == layer.rows > 0
+    if table and (places := _places(member, layer, spec, where=where)) is not None:
+        return _read_table(member, layer, builder, places, crs=crs)
     builder.rows, notes = _read_rows(member, layer, builder.rules.fields)
     return builder.layer(layer.crs, implicit=layer.implicit, requested=crs, notes=notes)
+
+
+def _places(
+    member: Member, layer: LayerDescription, spec: LayerSpec, *, where: str
+) -> PlaceReader | None:
+    """Return the reader of positions in the fields of a layer without geometry.
+
+    SourceError if there are none, or None if its geometries are only missing.
+    """
+    found = stated_fields(spec, layer.fields, where=where)
+    if found is None:
+        rows = [*first_rows_of(member, layer.fields, min(layer.rows, SAMPLE_ROWS))]
+        found = find_positions(layer.fields, rows, subject=str(member.layer))
+    if found is None and layer.geometry == NO_GEOMETRY:
+        raise SourceError(
+            f"{where} has no geometry, and {no_positions(layer.fields)}; or give the layer that "
+            "contains the positions."
+        )
+    if found is not None and not found.sure:
+        raise SourceError(f"{where} {uncertain_positions(found)}.")
+    return None if found is None else PlaceReader(found, where)
+
+
+def _read_table(
+    member: Member,
+    layer: LayerDescription,
+    builder: LayerBuilder,
+    places: PlaceReader,
+    *,
+    crs: str | None,
+) -> RawLayer:
+    """Read a layer without geometry, with positions in its fields."""
+    fields = tuple(dict.fromkeys((*builder.rules.fields, *places.fields.names)))
+    for number, row in enumerate(first_rows_of(member, fields, layer.rows), start=1):
+        try:
+            place: Position | str = places.read(row)
+        except BadFeatureError as error:
+            place = str(error)
+        builder.rows.add(row, str(number), place)
+    return builder.layer(
+        places.crs or layer.crs,
+        implicit=layer.implicit and places.crs is None,
+        requested=crs,
+        notes=places.fields.questions,
+    )
 
 
 def read_tables(
@@ -186,18 +241,21 @@ def read_layers(
 
 def first_rows(
     path: Path, *, limit: int
-) -> Iterator[tuple[LayerInfo, tuple[Mapping[str, Any], ...], tuple[str, ...]]]:
-    """Yield each layer of a file, its first readable rows, and its columns of coordinates."""
+) -> Iterator[tuple[LayerInfo, tuple[Mapping[str, Any], ...], PositionFields | None]]:
+    """Yield each layer of a file, its first readable rows, and the fields of its positions."""
     for member in _layers(path):
         table = _csv(member, None, where=str(member))
         info = _describe(member)
         if table is None:
-            count = min(limit, info.rows)
-            yield info, tuple(first_rows_of(member, info.fields, count)), ()
+            rows = tuple(first_rows_of(member, info.fields, min(limit, info.rows)))
+            plain_table = info.geometry == NO_GEOMETRY
+            subject = f"{path.stem} {info.name}"
+            found = find_positions(info.fields, rows, subject=subject) if plain_table else None
+            yield info, rows, found
             continue
         readable = (row for row in table.rows() if not isinstance(row, str))
-        coordinates = (table.x, table.y) if table.x and table.y else ()
-        yield info, tuple(itertools.islice(readable, limit)), coordinates
+        found = table.places.fields if table.places else None
+        yield info, tuple(itertools.islice(readable, limit)), found
 
 
 def _layers(path: Path) -> tuple[Member, ...]:
@@ -257,10 +315,12 @@ def _describe(member: Member) -> LayerInfo:
     table = _csv(member, None, where=str(member))
     if table is not None:
         rows, geometry = table.survey()
-        crs, fields = table.crs, table.names
+        crs, fields = table.places.crs if table.places else None, table.names
     else:
         layer = describe(member, bounds=True)
         rows, geometry, crs, fields = layer.rows, layer.geometry, layer.crs, layer.fields
+        if member.driver == GEOJSON and rows and not layer.bounds:
+            geometry, crs = NO_GEOMETRY, None if layer.implicit else crs  # all null or not valid
         if layer.implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
             crs = None
     label = None if crs is None else crs_label(crs)
