@@ -64,7 +64,6 @@ FIRST_VALUES, PLACES = 20, 15
 # Positions of objects are this near to a town, and other orders of the axes mostly are not.
 NEAR_TOWN_KM = 50.0
 # Fewer decimals are those of measurements.
-MIN_DECIMALS = re.compile(r"\d[.,]\d{3}")
 MANY_DECIMALS = re.compile(r"\d[.,]\d{4}")
 FEW_DECIMALS = re.compile(r"\d[.,]\d")
 LONG_NUMBERS = re.compile(r"\d{5}")
@@ -231,6 +230,7 @@ class _Candidate:
     degrees: bool
     about: tuple[str, ...] = ()
     fixed: bool = False  # the order of the axes is certain
+    precise: bool = False  # as degrees of places are, and small numbers of a plane are not
 
 
 def find_positions(
@@ -296,7 +296,9 @@ def _whole_fields(
         )
         own = PositionFields(field=name, order=None if fixed else order, o_is_east=o_is_east)
         about_words = tuple(sorted(tokens - hints("frames") - hints("whole")))
-        yield _Candidate(own, places, rank, degrees, about_words, fixed)
+        fine = sum(len(MANY_DECIMALS.findall(str(value))) > 1 for value in filled)
+        precise = 2 * fine >= len(filled)
+        yield _Candidate(own, places, rank, degrees, about_words, fixed, precise)
 
 
 def _located(value: object, *, order: AxisOrder | None, o_is_east: bool) -> Located | None:
@@ -364,7 +366,7 @@ def _columns(
             name,
             numbers,
             marked=sum(map(is_angle, first)) / len(first),
-            fine=sum(bool(MIN_DECIMALS.search(str(value))) for value in filled) / len(filled),
+            fine=sum(bool(MANY_DECIMALS.search(str(value))) for value in filled) / len(filled),
             axis=axes.pop() if len(axes) == 1 else "",
         )
 
@@ -416,7 +418,15 @@ def _pairs(
         if letters == (LATITUDE, LONGITUDE):
             pair, places = pair.exchanged, tuple(place and place[::-1] for place in places)
         about_words = tuple(sorted(w for w in words - hints("frames") if not w.isdecimal()))
-        yield _Candidate(pair, places, rank, degrees, about_words, fixed=all(letters))
+        yield _Candidate(
+            pair,
+            places,
+            rank,
+            degrees,
+            about_words,
+            fixed=all(letters),
+            precise=all(item and max(item.fine, item.marked) >= 0.5 for item in both),  # noqa: PLR2004 - half
+        )
     if not named:
         yield from _guesses(columns, roles, own)
 
@@ -509,7 +519,7 @@ def _oriented(best: _Candidate) -> PositionFields:
         if found.field is None:
             text = f"{found.y} is out of the range of latitudes, so that {found.x} is taken for it"
             questions = (text,)
-    elif all(fits) and _distance(places) > NEAR_TOWN_KM >= _distance(turned):
+    elif all(fits) and best.precise and _distance(places) > NEAR_TOWN_KM >= _distance(turned):
         there, here = (
             min(_towns(some), key=lambda town: town.distance_km) for some in (places, turned)
         )
