@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import errno
+import functools
 import json
 import os
 import shlex
@@ -17,6 +18,7 @@ from sentences import sentence
 import semsig_gis.cli.app  # noqa: F401 - with the command of the workbench
 from semsig_gis.commands import Result, command_line, commands
 from semsig_gis.commands.schema import command_schema
+from semsig_gis.evaluation.identifiability import analysis
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -103,6 +105,12 @@ def fields(condition: Callable[[Field], Any]) -> list[Any]:
 def files(folder: Path) -> dict[Path, int]:
     """Return the files in a folder with their times."""
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture(autouse=True)
+def _few_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = functools.partial(analysis.identify, trials=60, class_trials=5)
+    monkeypatch.setattr(analysis, "identify", few)
 
 
 @pytest.fixture
