@@ -515,7 +515,7 @@ def _oriented(best: _Candidate) -> PositionFields:
         return _with_grid(found.exchanged, turned)
     fits = (_in_degrees(places), _in_degrees(turned))
     questions: tuple[str, ...] = ()
-    if fits == (False, True):
+    if fits == (False, True) and (best.precise or found.field is not None):
         if found.field is None:
             text = f"{found.y} is out of the range of latitudes, so that {found.x} is taken for it"
             questions = (text,)
