@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from semsig_gis.commands.load import LoadOptions, Quality, catalogs
 from semsig_gis.commands.model import Option, Reporter, Result, command
-from semsig_gis.core import CatalogError, EmptyResultError, InputError, SourceError
+from semsig_gis.core import CatalogError, EmptyResultError, InputError, SourceError, nearest_town
 
 
 @command(
@@ -79,7 +79,14 @@ class Fetch(LoadOptions):
         from urllib.parse import urlsplit
 
         from semsig_gis.objects import assemble, choose_layers
-        from semsig_gis.sources import fetch_layers, find_area, load_catalog, open_cache
+        from semsig_gis.sources import (
+            advice,
+            fetch_layers,
+            find_area,
+            load_catalog,
+            open_cache,
+            other_orders,
+        )
 
         catalog = load_catalog(self.catalog)
         if self.server is not None:
@@ -127,10 +134,12 @@ class Fetch(LoadOptions):
                 layers = fetch([spec for spec in specs if spec not in ground])
         if not any(map(len, layers)):
             low, high = place.bounds[:2], place.bounds[2:]
+            middle = ((low[0] + high[0]) / 2, (low[1] + high[1]) / 2)
+            orders = other_orders(place.numbers) if place.numbers else ()
             raise EmptyResultError(
                 f"nothing was found in {self.area}, latitude {low[1]:.10g} to {high[1]:.10g} and "
-                f"longitude {low[0]:.10g} to {high[0]:.10g}; give another area, and a box as "
-                "west,south,east,north."
+                f"longitude {low[0]:.10g} to {high[0]:.10g}, {nearest_town(*middle)}; give another "
+                f"area, and a box as west,south,east,north{advice(orders)}."
             )
         with reporter.progress("joining the objects"):
             loaded = assemble(
@@ -140,5 +149,6 @@ class Fetch(LoadOptions):
                 collapse=self.collapse,
                 merge=self.merge,
                 max_distortion=self.max_distortion,
+                keep_far=True,
             )
         return self.save(loaded)

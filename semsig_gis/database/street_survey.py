@@ -132,7 +132,7 @@ class Survey:
             "occlusion": self.occlusion,
             "street_km": self.street_km,
             "radius": self.radius,
-            "town": self.town,
+            "town": asdict(self.town),
             "families": families,
         }
 

@@ -39,20 +39,19 @@ def database_summary(
     Returns
     -------
     dict
-        ``signatures``, ``mean_length``, ``covered_km2``, ``radius_m``, ``step_m``,
-        ``levels``, ``crs``, ``extent_degrees`` (west, south, east and north of the
-        viewpoints), ``town`` (see `Town`), ``distortion`` (of the plane, see
-        `Distortion.to_dict`), ``file_mb`` and ``mb_per_km2`` (millions of bytes or None),
-        ``version``, ``licenses``, ``notes`` (warnings about its data); ``viewpoints``: ``mode``,
-        ``half_width_m`` (of streets, else None) and ``area_km2`` (of the chosen area,
-        or None); ``occlusion_m``: the tolerance, or None without buildings; ``occurrences``: one dict per class (``code``,
-        ``symbol``, ``name``, ``title``, ``family``, ``range_m``, ``number``, ``share``,
-        ``objects``: its count or None, ``objects_per_km2``, ``entropy_bits``); ``density_from``:
-        ``"objects"`` or ``"occurrences"``; ``cell_bits``; ``groups``: for ``type``,
-        ``angle`` and ``both`` the statistics of the group sizes from
-        `pandas.Series.describe` (``std`` is that of a sample, None for a single group),
-        ``unique`` (share of the cells with a unique signature) and ``entropy_bits``;
-        ``largest_type_group``: ``types`` and ``cells``.
+        ``signatures``, ``mean_length``, ``covered_km2``, ``radius_m``, ``step_m``, ``levels``,
+        ``crs``, ``extent_degrees`` (west, south, east and north of the viewpoints), ``town`` (see
+        `Town`), ``distortion`` (of the plane, see `Distortion.to_dict`), ``file_mb`` and
+        ``mb_per_km2`` (millions of bytes or None), ``version``, ``licenses``, ``notes`` (warnings
+        about its data); ``viewpoints``: ``mode``, ``half_width_m`` (of streets, else None) and
+        ``area_km2`` (of the chosen area, or None); ``occlusion_m``: the tolerance, or None without
+        buildings; ``occurrences``: one dict per class (``code``, ``symbol``, ``name``, ``title``,
+        ``family``, ``range_m``, ``number``, ``share``, ``objects``: its count or None,
+        ``objects_per_km2``, ``entropy_bits``); ``density_from``: ``"objects"`` or
+        ``"occurrences"``; ``cell_bits``; ``groups``: for ``type``, ``angle`` and ``both`` the
+        statistics of the group sizes from `pandas.Series.describe` (``std`` is that of a sample,
+        None for a single group), ``unique`` (share of the cells with a unique signature) and
+        ``entropy_bits``; ``largest_type_group``: ``types`` and ``cells``.
 
     Notes
     -----

@@ -23,6 +23,7 @@ from semsig_gis.core import (
     InputError,
     cell_ids,
     crs_label,
+    nearest_town,
     plane_distortion,
     require_metric_crs,
     signed_degrees,
@@ -124,6 +125,11 @@ class _Towns:
         return towns[cell]
 
     @property
+    def number(self) -> int:
+        """Number of towns."""
+        return int(self._town.max()) + 1
+
+    @property
     def large(self) -> int:
         """Number of towns without those that are only a few stray places far from the largest.
 
@@ -153,6 +159,7 @@ def settle_extent(
     *,
     crs: AnyCrs | None = None,
     max_distortion: float = MAX_DISTORTION,
+    keep_far: bool = False,
 ) -> tuple[tuple[RawLayer, ...], CRS, tuple[str, ...]]:
     """Check the positions of layers, remove rows far from all others, and choose the metric CRS.
 
@@ -164,6 +171,8 @@ def settle_extent(
         Metric CRS; by default the UTM zone of most objects.
     max_distortion : float
         Maximum error of bearings in degrees, and of lengths in percent, over the data.
+    keep_far : bool, default False
+        Whether rows and layers far from all others are kept.
 
     Returns
     -------
@@ -208,13 +217,14 @@ def settle_extent(
             )
         return tuple(layers), metric, ()
     towns = _Towns(places)
-    for located in with_points:
+    for located in () if keep_far else with_points:
         _refuse_isolated_layer(located, towns)
     metric = metric or _utm_zone(*towns.centre())
-    extents = [towns.bounds(town) for town in range(towns.large)]
-    places = places[towns.of(places) < towns.large]
+    kept = towns.number if keep_far else towns.large
+    extents = [towns.bounds(town) for town in range(kept)]
+    places = places[towns.of(places) < kept]
     notes = _require_plane(extents, places, metric, max_distortion)
-    return tuple(_without_strays(item, towns) for item in located_layers), metric, notes
+    return tuple(_without_strays(item, towns, kept) for item in located_layers), metric, notes
 
 
 def _located(layer: RawLayer) -> _LocatedLayer:
@@ -304,13 +314,20 @@ def _refuse_isolated_layer(located: _LocatedLayer, towns: _Towns) -> None:
     """Raise CrsError if no place of a layer is in the largest town."""
     if len(located.places) < FEW_PLACES or (towns.of(located.places) == 0).any():
         return
-    remedy = "correct the crs of the wrong ones, or load them separately"
+    remedy = (
+        "correct the crs of the wrong ones, load them separately, or give --clip none if both are "
+        "right"
+    )
     if located.swapped is not None and towns.of(np.array([located.swapped]))[0] == 0:
         remedy = f"with x and y exchanged it would lie there, so correct the wrong ones: {EXCHANGE}"
-    layer_box, data_box = _box(_Towns(located.places).bounds(0)), _box(towns.bounds(0))
+    own = _Towns(located.places)
+    layer_box, data_box = (
+        f"{_box(item.bounds(0))} in degrees ({nearest_town(*item.centre())})"
+        for item in (own, towns)
+    )
     raise CrsError(
-        f"layer {located.layer.spec.name!r} lies at {layer_box} in degrees, far from most of the "
-        f"data at {data_box}; {remedy}."
+        f"layer {located.layer.spec.name!r} lies at {layer_box}, far from most of the data at "
+        f"{data_box}; {remedy}."
     )
 
 
@@ -360,20 +377,20 @@ def _require_plane(
     return tuple(notes)
 
 
-def _without_strays(located: _LocatedLayer, towns: _Towns) -> RawLayer:
-    """Return a layer without the objects that are far from all others."""
+def _without_strays(located: _LocatedLayer, towns: _Towns, kept: int) -> RawLayer:
+    """Return a layer without the objects that are in none of the first `kept` towns."""
     layer = located.layer
     rows = np.flatnonzero(_valid(located.degrees))
     if layer.spec.role != "objects" or not len(rows):
         return layer
-    strays = rows[towns.of(located.degrees[rows]) >= towns.large]
+    strays = rows[towns.of(located.degrees[rows]) >= kept]
     if not len(strays):
         return layer
     places = _distinct(located.degrees[strays])
     shown = " and ".join(_place((float(x), float(y))) for x, y in places[:PLACES_SHOWN])
     more = f" and {len(places) - PLACES_SHOWN} more places" if len(places) > PLACES_SHOWN else ""
     rows_lie = "1 row lies" if len(strays) == 1 else f"{len(strays):,} rows lie"
-    note = f"{rows_lie} far from all others, at {shown}{more}; left out"
+    note = f"{rows_lie} far from all others, at {shown}{more}; left out (--clip none keeps all)"
     counts = replace(layer.counts, misplaced=layer.counts.misplaced + len(strays))
     keep = np.ones(len(layer), bool)
     keep[strays] = False
@@ -381,7 +398,8 @@ def _without_strays(located: _LocatedLayer, towns: _Towns) -> RawLayer:
 
 
 def _place(place: tuple[float, float]) -> str:
-    return f"latitude {place[1]:.5g}, longitude {place[0]:.5g}"
+    """Return latitude and longitude, and the nearest town."""
+    return f"latitude {place[1]:.5g}, longitude {place[0]:.5g} ({nearest_town(*place)})"
 
 
 def _box(bounds: Bounds) -> str:

@@ -67,7 +67,8 @@ def load(
     clip : str, optional
         Area to keep: ``west,south,east,north`` in degrees, the path of a file with polygons,
         ``"box"`` for the box that OpenStreetMap files state, or ``"none"`` for everything. By
-        default, each of these files is cut to its box if it states one.
+        default, each of these files is cut to its box if it states one. Rows far from all others
+        are left out, unless an area or ``"none"`` is given.
     crs : int, str or pyproj.CRS, optional
         CRS of files that do not state one, such as 2154, its EPSG code.
     metric_crs : int, str or pyproj.CRS, optional
@@ -156,5 +157,6 @@ def load(
         merge=merge,
         counted=[layer for layer in raw if layer.spec not in specs],
         max_distortion=max_distortion,
+        keep_far=clip not in {None, BOX},  # the user says where the data is
         notes=notes,
     )

@@ -580,6 +580,7 @@ def assemble(
     merge: bool = True,
     counted: Sequence[RawLayer] = (),
     max_distortion: float = MAX_DISTORTION,
+    keep_far: bool = False,
     notes: Sequence[str] = (),
 ) -> Loaded:
     """Transform raw layers to one metric CRS, and merge objects that occur in several layers.
@@ -600,6 +601,8 @@ def assemble(
         Further layers that are only counted, not included; the counts are in the report.
     max_distortion : float, default 6
         Maximum error of bearings in degrees, and of lengths in percent, over the data.
+    keep_far : bool, default False
+        Whether objects and layers far from all others are kept.
     notes : sequence of str
         Warnings from reading, to be included in the result.
 
@@ -621,6 +624,7 @@ def assemble(
         [note_outside(layer) for layer in layers],
         crs=metric_crs or catalog.metric_crs,
         max_distortion=max_distortion,
+        keep_far=keep_far,
     )
     notes = (*notes, *extent_notes)
     buildings, building_reports = _surroundings(layers, "buildings", system)

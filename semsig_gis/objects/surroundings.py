@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,7 +20,7 @@ from semsig_gis.sources import (
     WGS84,
     Area,
     LayerSpec,
-    exchanged_error,
+    elsewhere_error,
     file_reader,
     frame_fields,
     frame_layers,
@@ -32,6 +31,7 @@ from semsig_gis.sources import (
     parse_area,
     parse_crs,
     read_parquet,
+    read_polygons,
     reader,
     transformed,
 )
@@ -57,6 +57,8 @@ GROUND = "semsig_ground"
 """Key in the `attrs` of files by `save_ground`, which may be removed with the street objects."""
 NEAR_M = 1000.0
 """Distance from the street objects of a city to its buildings and streets."""
+FAR_M = 10_000.0
+"""Distance of an area from all objects from which it is refused; none is seen from so far."""
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 KIND_OF: dict[str, GeometryKind] = {"buildings": "polygon", "streets": "line", "area": "polygon"}
 # Distance between points along the edges of a box, which are curves in the metric CRS: this is
@@ -264,26 +266,35 @@ def read_area(
     """Return a box ``west,south,east,north`` in degrees, or the polygons of a file or table.
 
     The result is one (multi)polygon in `crs`. Errors are those of `parse_area` and
-    `read_surroundings`, and InputError if the area does not meet the box `near`, ``xmin, ymin,
-    xmax, ymax`` in `crs`, but would with latitude and longitude exchanged.
+    `read_surroundings`, and InputError if the area is far from the box `near`, ``xmin, ymin,
+    xmax, ymax`` in `crs`, or would meet it with its numbers in another order.
     """
     system = parse_crs(crs)
+    numbers: tuple[float, ...] = ()
     if isinstance(area, str | Path) and NUMBERS.fullmatch(str(area)):
-        box = shapely.segmentize(parse_area(str(area)).polygon, EDGE_DEGREES)
-        shapes = transformed(np.array([box]), WGS84, system)
+        given = parse_area(str(area))
+        numbers = given.numbers
+        shapes = transformed(
+            np.array([shapely.segmentize(given.polygon, EDGE_DEGREES)]), WGS84, system
+        )
     else:
         shapes = _read(area, "area", crs).geometry.to_numpy()
     joined = join_areas(shapes)
     if joined is None:
         raise InputError(f"{_named(area)} encloses no area; give {_of_kind(area, 'polygon')}.")
     around = None if near is None else shapely.box(near[0], near[1], near[2], near[3])
-    if around is not None and not joined.intersects(around):
-        (degrees,) = transformed(np.array([joined]), system, WGS84)
-        exchanged = Area(degrees, _named(area)).exchanged
-        if exchanged is not None:
-            (shape,) = transformed(np.array([exchanged.polygon]), WGS84, system)
-            if np.isfinite(shape.bounds).all() and shape.intersects(around):
-                raise exchanged_error(Area(degrees, _named(area)))
+    if around is None or joined.intersects(around):
+        return joined
+
+    def meets(other: Area) -> bool:
+        (shape,) = transformed(np.array([other.polygon]), WGS84, system)
+        return bool(np.isfinite(shape.bounds).all() and shape.intersects(around))
+
+    (polygon,) = transformed(np.array([joined]), system, WGS84)
+    (centre,) = transformed(np.array([around.centroid]), system, WGS84)
+    degrees = Area(polygon, str(area) if numbers else _named(area), numbers)
+    if joined.distance(around) > FAR_M or any(meets(other) for _, other in degrees.others):
+        raise elsewhere_error(degrees, meets, (centre.x, centre.y))
     return joined
 
 
@@ -343,14 +354,13 @@ def _read_file(
     if reader_name is not None:
         (layer,) = reader(reader_name)(path, [load_catalog("openstreetmap").layer(role)])
         return _with_licences(layer), layer.notes
+    if role == "area":
+        return read_polygons(path).to_frame("geometry"), ()
     if path.suffix.lower() in SUFFIXES:
         return read_parquet(path, kind=f"{kind}s", box=box), ()
-    spec = LayerSpec(name=role, class_name="", geometry=kind)
-    if role != "area":
-        fields = [field for layer in list_layers(path) for field in layer.fields]
-        spec = replace(
-            spec, name_field=next((name for name in fields if name.lower() == NAME), None)
-        )
+    fields = [field for layer in list_layers(path) for field in layer.fields]
+    name_field = next((name for name in fields if name.lower() == NAME), None)
+    spec = LayerSpec(name=role, class_name="", geometry=kind, name_field=name_field)
     (layer,) = reader("vector_file")(path, [spec])
     if layer.errors:
         raise SourceError(

@@ -1,8 +1,11 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
 from .area import Area as Area
-from .area import exchanged_error as exchanged_error
+from .area import advice as advice
+from .area import elsewhere_error as elsewhere_error
 from .area import join_areas as join_areas
+from .area import other_orders as other_orders
+from .area_file import read_polygons as read_polygons
 from .catalog import MEASURES as MEASURES
 from .catalog import Catalog as Catalog
 from .catalog import built_in_taxonomy as built_in_taxonomy

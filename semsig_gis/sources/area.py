@@ -9,26 +9,37 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import shapely
+from pyproj import Geod
 
-from semsig_gis.core import HALF_TURN, InputError
+from semsig_gis.core import HALF_TURN, InputError, nearest_town
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from pathlib import Path
 
     import numpy as np
     from numpy.typing import NDArray
 
+    from semsig_gis.core import Bounds
+
 MOST_TILES = 10_000
 QUARTER_TURN = 90.0  # degrees of latitude
+# The longest side of a box of a city; numbers in another order make one that is wide both ways.
+CITY_DEGREES, WIDE_DEGREES = 2.0, 10.0
+ALIKE = 4.0  # ratio of areas of boxes that may both be meant
+EXCHANGED = "with latitude and longitude exchanged"
 
 
 @dataclass(frozen=True, eq=False)
 class Area:
-    """An area of the Earth: its outline in EPSG:4326, longitude first, and a name to show."""
+    """An area of the Earth: its outline in EPSG:4326, longitude first, and a name to show.
+
+    `numbers` are the four that a user gave, if any.
+    """
 
     polygon: shapely.Polygon | shapely.MultiPolygon
     name: str
+    numbers: tuple[float, ...] = ()
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -37,11 +48,16 @@ class Area:
         return west, south, east, north
 
     @property
-    def exchanged(self) -> Area | None:
-        """The area with latitude and longitude exchanged; None if that is not on the Earth."""
+    def others(self) -> Iterator[tuple[str, Area]]:
+        """What else the user may have meant, with the words for it."""
+        if self.numbers:
+            for words, box in other_orders(self.numbers):
+                yield words, Area(shapely.box(*box), self.name)
+            return
         polygon = shapely.transform(self.polygon, lambda xy: xy[:, ::-1])
         _, south, _, north = polygon.bounds
-        return Area(polygon, self.name) if max(-south, north) <= QUARTER_TURN else None
+        if max(-south, north) <= QUARTER_TURN:
+            yield EXCHANGED, Area(polygon, self.name)
 
     @property
     def boxes(self) -> tuple[tuple[float, float, float, float], ...]:
@@ -122,13 +138,72 @@ def _touching(area: Area, tiles: Iterable[Tile]) -> list[Tile]:
     return [tile for tile in tiles if area.polygon.intersects(shapely.box(*tile.bounds))]
 
 
-def exchanged_error(area: Area) -> InputError:
-    """Return the error for an area that would be right with latitude and longitude exchanged."""
-    south, west, north, east = area.bounds
+def other_orders(numbers: Sequence[float]) -> Iterator[tuple[str, Bounds]]:
+    """Yield the boxes that four numbers are in other orders than west, south, east, north.
+
+    Each is west, south, east and north, with words for the order. The two corners may be any.
+    """
+    a, b, c, d = numbers
+    seen = {(a, b, c, d)}
+    for words, xs, ys in (
+        (EXCHANGED, (b, d), (a, c)),
+        ("with its sides in order", (a, c), (b, d)),
+        ("read as south,north,west,east", (c, d), (a, b)),
+        ("read as west,east,south,north", (a, b), (c, d)),
+    ):
+        box = (min(xs), min(ys), max(xs), max(ys))
+        west, south, east, north = box
+        on_earth = max(-west, east) <= HALF_TURN and max(-south, north) <= QUARTER_TURN
+        if on_earth and west < east and south < north and box not in seen:
+            seen.add(box)
+            yield words, box
+
+
+def sides_of(box: Bounds) -> tuple[float, float]:
+    """Return the width and the height of a box."""
+    west, south, east, north = box
+    return east - west, north - south
+
+
+def advice(orders: Iterable[tuple[str, Bounds]]) -> str:
+    """Return the boxes that a user may have meant, the smallest ones, nearest to a town first."""
+    boxes = [(words, box) for words, box in orders if max(sides_of(box)) < WIDE_DEGREES]
+    least = min((math.prod(sides_of(box)) for _, box in boxes), default=0.0)
+    readings = []
+    for words, (west, south, east, north) in boxes:
+        if (east - west) * (north - south) <= ALIKE * least:
+            town = nearest_town((west + east) / 2, (south + north) / 2)
+            box = box_text((west, south, east, north))
+            readings.append((town.distance_km, f"{words} it is {box} ({town})"))
+    texts = ", ".join(text for _, text in sorted(readings))
+    return f"; {texts}" if texts else ""
+
+
+def box_text(bounds: Iterable[float]) -> str:
+    """Return bounds in degrees as ``west,south,east,north``."""
+    return ",".join(f"{side:.10g}" for side in bounds)
+
+
+def elsewhere_error(
+    area: Area, meets: Callable[[Area], bool], centre: tuple[float, float]
+) -> InputError:
+    """Return the error for an area that does not meet the objects.
+
+    It says what would meet them, by `meets`, such as the area with latitude and longitude
+    exchanged; else where the area and the `centre` of the objects, in degrees, are.
+    """
+    for words, other in area.others:
+        if meets(other):
+            return InputError(
+                f"the area {area.name} is somewhere else, but it would be right {words}; write "
+                f"west,south,east,north, which is {box_text(other.bounds)}."
+            )
+    point = area.polygon.representative_point()
+    *_, metres = Geod(ellps="WGS84").inv(point.x, point.y, *centre)
+    town, own = nearest_town(*centre), nearest_town(point.x, point.y)
     return InputError(
-        f"the area {area.name} is somewhere else, but it would be right with latitude and "
-        "longitude exchanged; write west,south,east,north, which is "
-        f"{west:.10g},{south:.10g},{east:.10g},{north:.10g}."
+        f"the area {area.name} lies elsewhere: it is {own}, and the objects are {town}, "
+        f"{metres / 1e3:,.0f} km away; give an area that they are in."
     )
 
 

@@ -11,11 +11,25 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import shapely
 
-from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, EmptyResultError, InputError
-from semsig_gis.sources import vector
-from semsig_gis.sources.area import Area, exchanged_error, join_areas
+from semsig_gis.core import (
+    FULL_TURN,
+    HALF_TURN,
+    CrsError,
+    EmptyResultError,
+    InputError,
+)
+from semsig_gis.sources.area import (
+    CITY_DEGREES,
+    WIDE_DEGREES,
+    Area,
+    advice,
+    elsewhere_error,
+    join_areas,
+    other_orders,
+    sides_of,
+)
+from semsig_gis.sources.area_file import read_polygons
 from semsig_gis.sources.layer import transformed
-from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.paths import FILE_SUFFIXES
 from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
 
@@ -27,7 +41,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources.layer import RawLayer
 
-NUMBERS = re.compile(r"[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*")
+NUMBERS = re.compile(r"[\s\[(]*[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*[\])\s]*")
 T = TypeVar("T", shapely.Polygon | shapely.MultiPolygon, "NDArray[np.object_]")
 # The text by which a user requests the bounding box that a file states.
 BOX = "box"
@@ -49,39 +63,36 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
         )
     if not NUMBERS.fullmatch(text):
         path = Path(text)
-        polygons = LayerSpec(name="area", class_name="", geometry="polygon")
-        layer = vector.read_layer(path, polygons)
-        if layer.errors:
-            raise InputError(
-                f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
-            )
-        return _area_of(layer.table.geometry, str(path), name=path.stem, kind="file")
+        return _area_of(read_polygons(path), str(path), name=path.stem, kind="file")
     try:
-        west, south, east, north = (float(number) for number in text.split(","))
+        numbers = tuple(float(number) for number in text.strip("[]() \t").split(","))
+        west, south, east, north = numbers
     except ValueError as error:
         raise InputError(
             f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
         ) from error
+    others = list(other_orders(numbers))
     # A box that crosses 180 degrees and is wider than half of the Earth is taken for an error.
     across = east < west and east + FULL_TURN - west < HALF_TURN
     on_earth = max(abs(west), abs(east)) <= LONGITUDE_LIMIT
     if not (on_earth and (west < east or across)) or not (
         -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
     ):
-        exchanged = (
-            f" With latitude and longitude exchanged it is {south:.10g},{west:.10g},{north:.10g},"
-            f"{east:.10g}."
-            if -LATITUDE_LIMIT <= west < east <= LATITUDE_LIMIT and south < north
-            else ""
-        )
         raise InputError(
             f"bounding box {text!r} is not an area; write west,south,east,north in degrees, with "
             "west below east within -180 to 180, or above it across 180 degrees, and south below "
-            f"north within -90 to 90.{exchanged}"
+            f"north within -90 to 90{advice(others)}."
+        )
+    cities = [item for item in others if max(sides_of(item[1])) < CITY_DEGREES]
+    if cities and min(sides_of((west, south, east, north))) > WIDE_DEGREES:
+        raise InputError(
+            f"bounding box {text!r} is {east - west:.3g} by {north - south:.3g} degrees, so it is "
+            f"not west,south,east,north{advice(cities)}."
         )
     spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
     boxes = [shapely.box(start, south, end, north) for start, end in spans if start < end]
-    return Area(boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes), text)
+    polygon = boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes)
+    return Area(polygon, text, numbers)
 
 
 def names_place(text: str) -> bool:
@@ -105,16 +116,17 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
     Returns
     -------
     tuple of RawLayer
-        The layers; their counts include the rows outside. InputError if the area is not valid, or
-        contains no row but would with latitude and longitude exchanged, or no file states its box.
+        The layers; their counts include the rows outside. InputError if the area is not valid or
+        contains no object, or no file states its box.
 
     Examples
     --------
     >>> from semsig_gis import CitySpec, synthetic_city
     >>> from semsig_gis.sources import clip_layers
     >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> [layer.counts.kept for layer in clip_layers(layers[:2], "2.3,48.8,2.4,48.9")]
-    [0, 0]
+    >>> trees, *_ = clip_layers(layers, "2.9,48.7,3.0,48.8")
+    >>> trees.counts.outside > 0
+    True
     """
     if not isinstance(text, str) or text != BOX:
         area = parse_area(text)
@@ -128,10 +140,28 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
             )
         area = Area(polygon, BOX)
     clipped = tuple(clip_layer(layer, area) for layer in layers)
-    exchanged = None if any(map(len, clipped)) else area.exchanged
-    if exchanged is not None and any(len(clip_layer(layer, exchanged)) for layer in layers):
-        raise exchanged_error(area)
+    deciding = [layer for layer in layers if layer.spec.role == "objects"] or layers
+    places = [layer for layer in deciding if not shapely.is_missing(layer.geometry).all()]
+    if places and not any(_meets(layer, area) for layer in places):
+        raise elsewhere_error(
+            area,
+            lambda other: any(_meets(layer, other) for layer in places),
+            _centre(places),
+        )
     return clipped
+
+
+def _meets(layer: RawLayer, area: Area) -> bool:
+    """Whether a row of a layer is in an area."""
+    outside, _ = _outside(layer, area)
+    return bool((~outside & ~shapely.is_missing(layer.geometry)).any())
+
+
+def _centre(layers: Sequence[RawLayer]) -> tuple[float, float]:
+    """Return the median longitude and latitude of the rows of layers."""
+    shapes = [transformed(layer.geometry, layer.known_crs, WGS84) for layer in layers]
+    x, y = np.nanmedian(shapely.get_coordinates(np.concatenate(shapes)), axis=0)
+    return float(x), float(y)
 
 
 def clip_to_extents(layers: Sequence[RawLayer]) -> tuple[tuple[RawLayer, ...], str]:

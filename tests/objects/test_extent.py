@@ -155,7 +155,7 @@ REFUSED = {  # layers, the metric CRS, words
     "a layer of another city": (
         [layer(town(PARIS, size=50)), layer(town(LYON), name="b")],
         None,
-        ["'b'", "4.8", "far from most of the data at 2.3", "load them separately"],
+        ["'b'", "4.8", "Lyon, France", "far from most of the data at 2.3", "--clip none"],
     ),
     "two cities": (
         [layer(town(PARIS), town(SYDNEY))],
@@ -184,6 +184,18 @@ def test_implausible_positions_are_refused(
 ) -> None:
     with refused(CrsError, *words):
         settle_extent(layers, crs=metric)
+
+
+def test_what_is_far_can_be_kept() -> None:
+    """A layer of another town, and a row of a village that the others are far from."""
+    village = np.array([(4.8, 48.6)])
+    layers = [layer(town(PARIS, size=50), village), layer(town(LYON), name="b")]
+    settled, _, (note,) = settle_extent(layers, keep_far=True)
+    assert [len(item) for item in settled] == [51, 40]
+    assert "3 places far apart" in note
+    (alone,), _, _ = settle_extent(layers[:1])
+    assert (len(alone), alone.counts.misplaced) == (50, 1)
+    assert "--clip none" in alone.notes[-1]
 
 
 def test_larger_distortion_can_be_allowed() -> None:

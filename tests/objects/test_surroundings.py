@@ -48,6 +48,38 @@ def test_area_may_be_a_box_in_degrees() -> None:
         read_area("25,60,24,61", crs=CRS)
 
 
+LYON = (842_500.0, 6_519_800.0, 842_800.0, 6_520_100.0)  # in the same CRS
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("area.csv", "id;wkt\n1;POLYGON (({1} {0}, {3} {0}, {3} {2}, {1} {2}, {1} {0}))\n"),
+        ("area.poly", "area\n1\n {1} {0}\n {3} {0}\n {3} {2}\n {1} {2}\nEND\nEND\n"),
+        ("", "{0},{1},{2},{3}"),
+    ],
+)
+def test_area_must_be_near_the_objects(tmp_path: Path, name: str, text: str) -> None:
+    """Areas of people: text of a table, of Osmosis and four numbers, latitude first and right."""
+    south, west, north, east = 45.763, 4.834, 45.765, 4.837
+
+    def given(*sides: float) -> str:
+        path = tmp_path / name
+        if name:
+            path.write_text(text.format(*sides))
+        return str(path) if name else text.format(*sides)
+
+    order = (west, south, east, north)
+    right = given(*order) if not name else given(south, west, north, east)
+    area = read_area(right, crs=CRS, near=LYON)
+    assert area.intersects(shapely.box(*LYON))
+    with refused(InputError, "lies elsewhere", "near Lyon, France", "near Montpellier, France"):
+        read_area(right, crs=CRS, near=HOUSE.bounds)
+    wrong = given(south, west, north, east) if not name else given(*order)
+    with refused(InputError, "latitude and longitude exchanged", "4.834,45.763,4.837,45.765"):
+        read_area(wrong, crs=CRS, near=LYON)
+
+
 def test_buildings_and_streets_of_an_openstreetmap_file(tmp_path: Path) -> None:
     nodes = [node(1, 24.9, 60.1), node(2, 24.91, 60.1), node(3, 24.91, 60.11)]
     ways = [way(n, ring, {"building": "yes"}) for n, ring in ((4, [1, 2, 3, 1]), (6, [1, 2, 3]))]

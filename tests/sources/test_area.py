@@ -157,10 +157,91 @@ def test_unreadable_polygon_file_is_refused(tmp_path: Path) -> None:
     path.write_text(json.dumps(collection([broken])))
     with refused(InputError, "polygons that cannot be read", "correct the file"):
         parse_area(str(path))
-    with pytest.warns(UserWarning, match="'crs' was not provided"):
-        nowhere = write(tmp_path, shapely.box(*BOX), crs=None)
-    with refused(SemsigError, "CRS"):
-        parse_area(nowhere)
+    with refused(CrsError, "not degrees", "ogr2ogr -s_srs"):
+        parse_area(unstated(tmp_path, shapely.box(770000, 6280000, 771000, 6281000)))
+    poly = tmp_path / "quarter.poly"
+    for text, words in (
+        ("", "encloses no area"),
+        ("quarter\n1\n 3.8 43.5\n 3.9 43.5\nEND\nEND\n", "at least three corners"),
+        ("quarter\n1\n 3.8 43.5 9\nEND\nEND\n", "line 3"),
+        ("quarter\n1\n 770000 6280000\n 771000 6280000\n 771000 6281000\nEND\n", "not degrees"),
+    ):
+        poly.write_text(text)
+        with refused(SemsigError, str(poly), words):
+            parse_area(str(poly))
+
+
+def unstated(folder: Path, shape: shapely.Geometry) -> str:
+    """Write a polygon as text of a table, which states no CRS."""
+    path = folder / "quarter.csv"
+    path.write_text(f"id;wkt\n1;{shapely.to_wkt(shape, rounding_precision=-1)}\n")
+    return str(path)
+
+
+def test_file_without_crs_is_in_degrees(tmp_path: Path) -> None:
+    assert parse_area(unstated(tmp_path, shapely.box(*BOX))).bounds == BOX
+
+
+RING = """
+1
+   {0} {1}
+   {2} {1}
+   {2} {3}
+   {0} {3}
+END
+"""
+
+
+def test_poly_file_has_rings_and_holes(tmp_path: Path) -> None:
+    rings = [(0, 0, 4, 4), (1, 1, 3, 3), (6.5e0, 0, 7, 1)]
+    outer, hole, other = (RING.format(*ring) for ring in rings)
+    path = tmp_path / "quarter.poly"
+    path.write_text(f"quarter{outer}{hole.replace('1', '!2', 1)}{other}END\n")
+    area = parse_area(str(path))
+    first, second, third = (shapely.box(*ring) for ring in rings)
+    assert area.polygon.equals(shapely.union(shapely.difference(first, second), third))
+    assert area.name == "quarter"
+
+
+@given(
+    st.tuples(st.floats(2, 60), st.floats(-70, -12)),
+    st.tuples(st.floats(0.01, 1), st.floats(0.01, 1)),
+    st.sampled_from(["wsen", "swne", "nesw", "snwe", "nsew", "wesn", "ewns", "wnes", "senw"]),
+)
+def test_box_in_another_order_is_noticed(
+    corner: tuple[float, float], size: tuple[float, float], order: str
+) -> None:
+    """The box is written out, in the refusal or where the objects are known to be elsewhere."""
+    west, south = (round(side, 3) for side in corner)
+    east, north = round(west + size[0], 3), round(south + size[1], 3)
+    sides = {"w": west, "s": south, "e": east, "n": north}
+    text = ",".join(f"{sides[side]:.10g}" for side in order)
+    right = f"{west:.10g},{south:.10g},{east:.10g},{north:.10g}"
+    middle = ((west + east) / 2, (south + north) / 2)
+    layer = benches(middle, middle)
+    try:
+        kept = [len(layer) for layer in clip_layers([layer], text)]
+    except InputError as error:
+        assert right in str(error)  # noqa: PT017 - either is right
+    else:
+        assert kept == [2]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("60,24.9,60.1,25.1", ["would be right with latitude and longitude exchanged",
+                               "24.9,60,25.1,60.1"]),
+        ("2.3,48.8,2.4,48.9", ["near Paris, France", "near Helsinki, Finland", "1,9"]),
+    ],
+)  # fmt: skip
+def test_area_elsewhere_is_refused(text: str, words: list[str], tmp_path: Path) -> None:
+    layer = benches((24.95, 60.05), (24.94, 60.15))
+    west, south, east, north = map(float, text.split(","))
+    box = shapely.box(west, south, east, north)
+    for area in (text, unstated(tmp_path, box), gpd.GeoDataFrame(geometry=[box], crs=4326)):
+        with refused(InputError, "elsewhere" if "near" in words[0] else "somewhere else", *words):
+            clip_layers([layer], area)
 
 
 @pytest.mark.parametrize(
