@@ -34,7 +34,7 @@ def file_reader(path: Path, *, sure: bool = False) -> str | None:
 
     With `sure`, a table needs columns that identify its elements, not only columns of tags.
     """
-    if path.name.lower().endswith(tuple(features.FORMATS)):
+    if path.name.lower().endswith((*features.FORMATS, *features.CHANGES)):
         return "osm_file"
     probe = probe_file(path)
     if probe.format == "overpass":

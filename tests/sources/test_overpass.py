@@ -35,7 +35,8 @@ from semsig_gis.sources import (
     waiting_time,
 )
 from semsig_gis.sources.osm import file as osm_file
-from semsig_gis.sources.osm.overpass import fetch_layers, read_layers
+from semsig_gis.sources.osm.documents import read_layers
+from semsig_gis.sources.osm.overpass import fetch_layers
 
 if TYPE_CHECKING:
     from collections.abc import Callable

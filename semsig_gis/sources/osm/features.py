@@ -45,7 +45,10 @@ if TYPE_CHECKING:
     from semsig_gis.sources.rows import Position
 
 # Suffixes of OpenStreetMap files, and the names of their formats in pyosmium.
-FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf"}
+FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf",
+           ".osh": "xml", ".osh.gz": "xml.gz", ".osh.bz2": "xml.bz2", ".o5m": "o5m"}  # fmt: skip
+# Suffixes of files with changes only.
+CHANGES = (".osc", ".osc.gz", ".osc.bz2", ".o5c")
 # Columns with all tags of a row: a map, JSON, or text such as '"amenity"=>"bench"'.
 MAPS = ("tags", "other_tags", "@other_tags")
 PAIR = re.compile(r'"((?:[^"\\]|\\.)*)"\s*=>\s*(?:"((?:[^"\\]|\\.)*)"|NULL)')

@@ -19,6 +19,7 @@ from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 from semsig_gis.core import HALF_TURN, CatalogError, SourceError, announce, temporary_folder
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.compression import check_compression_ratio
+from semsig_gis.sources.osm import documents
 from semsig_gis.sources.osm.elements import (
     KIND_BY_LETTER,
     TagIndex,
@@ -27,7 +28,7 @@ from semsig_gis.sources.osm.elements import (
     relation_shape,
     way_shape,
 )
-from semsig_gis.sources.osm.features import FORMATS
+from semsig_gis.sources.osm.features import CHANGES, FORMATS
 from semsig_gis.sources.osm.merge import age_notes, merge_extracts, read_errors
 from semsig_gis.sources.paths import require_file
 from semsig_gis.sources.rows import WGS84, BadFeatureError
@@ -115,10 +116,19 @@ def read_layers(
     temporary file, 16 bytes per node. Nodes become points, ways lines or areas, multipolygons
     areas; identifiers are such as ``"node/123"``. Elements of another kind than the layer needs
     count as filtered, clipped and invalid ones as unreadable. An element in several extracts counts
-    once, by its newest copy. `crs` only causes a note.
+    once, by its newest copy, also of the versions in a history, and not if it is deleted. XML that
+    pyosmium does not read is read by `documents`; beside other files, it gives layers of its own.
+    `crs` only causes a note.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     files = {path: _file(path) for path in paths}
+    dialects = [
+        path for path in files if _kind(path).startswith("xml") and documents.is_dialect(path)
+    ]
+    if dialects:
+        others = [path for path in files if path not in dialects]
+        more = read_layers(others, specs, filters=filters, crs=crs) if others else ()
+        return more + documents.read_layers(dialects, specs, filters=filters, crs=crs)
     where = str(paths[0]) if len(files) == 1 else f"{len(files)} extracts"
     layers = element_layers(specs, filters=filters, where=where)
     if not layers:
@@ -133,14 +143,18 @@ def read_layers(
     announce(seconds, f"reading {where}")
     index = TagIndex(specs)
     with contextlib.ExitStack() as stack:
-        if len(files) == 1:
+        stack.enter_context(read_errors(where))
+        if len(files) == 1 and not any(map(_has_versions, files.values())):
             (file,) = files.values()
+            # First the elements with tags, then the lines of the ways that they need.
+            outlines = _scan(file, layers, index)
         else:
+            outlines = None
+        if outlines is None:  # several extracts, or several versions of an element
             folder = stack.enter_context(temporary_folder(Path(tempfile.gettempdir())))
             file = merge_extracts(files, index, folder / "merged.opl")
-        stack.enter_context(read_errors(where))
-        # First the elements with tags, then the lines of the ways that they need.
-        outlines = _scan(file, layers, index)
+            layers = element_layers(specs, filters=filters, where=where)
+            outlines = _scan(file, layers, index) or []
         ways = {way for outline in outlines for way in (*outline.outer, *outline.inner)}
         lines = _lines(file, ways) if ways else {}
     for outline in outlines:
@@ -176,10 +190,7 @@ def _extent(files: Iterable[osmium.io.File]) -> Area | None:
 def _file(path: Path) -> osmium.io.File:
     """Open a file of elements; SourceError if it is missing, empty or of another format."""
     require_file(path, "an OpenStreetMap file")
-    name = path.name.lower()
-    kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
-    if kind is None:
-        raise SourceError(f"{path} is not an OpenStreetMap file; give one of {', '.join(FORMATS)}.")
+    kind = _kind(path)
     if path.stat().st_size == 0:
         raise SourceError(f"{path} is empty; download it again.")
     check_compression_ratio(path)
@@ -187,9 +198,32 @@ def _file(path: Path) -> osmium.io.File:
     return osmium.io.File(str(path.absolute()), kind)
 
 
-def _scan(file: osmium.io.File, layers: Sequence[LayerBuilder], index: TagIndex) -> list[_Outline]:
-    """Add the elements of a file to their layers; return the ways and multipolygons."""
-    outlines = []
+def _kind(path: Path) -> str:
+    """Return the name of a file's format in pyosmium; SourceError if it is another format."""
+    name = path.name.lower()
+    if name.endswith(CHANGES):
+        raise documents.changes_error(path)
+    kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
+    if kind is None:
+        raise SourceError(f"{path} is not an OpenStreetMap file; give one of {', '.join(FORMATS)}.")
+    return kind
+
+
+def _has_versions(file: osmium.io.File) -> bool:
+    """Whether a file says that it may have several versions of an element."""
+    with osmium.io.Reader(file, NOTHING) as reader:
+        return bool(reader.header().has_multiple_object_versions)
+
+
+def _scan(
+    file: osmium.io.File, layers: Sequence[LayerBuilder], index: TagIndex
+) -> list[_Outline] | None:
+    """Add the elements of a file to their layers; return the ways and multipolygons.
+
+    None if an element is there more than once.
+    """
+    outlines: list[_Outline] = []
+    names: set[str] = set()
     processor = osmium.FileProcessor(file, NODE | WAY | RELATION)
     for element in processor.with_filter(KeyFilter(*index.keys)):
         if not isinstance(element, Node | Way | Relation) or element.deleted:
@@ -197,7 +231,13 @@ def _scan(file: osmium.io.File, layers: Sequence[LayerBuilder], index: TagIndex)
         tags = dict(element.tags)
         kind = KIND_BY_LETTER[element.type_str()]
         name = f"{kind}/{element.id}"
-        for layer in (layers[number] for number in index.layers(tags)):
+        numbers = index.layers(tags)
+        if not numbers:
+            continue
+        if name in names:
+            return None
+        names.add(name)
+        for layer in (layers[number] for number in numbers):
             if isinstance(element, Node):
                 valid = element.location.valid()
                 position = _lonlat(element.location) if valid else "has no valid position"

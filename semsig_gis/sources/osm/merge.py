@@ -61,8 +61,10 @@ def merge_extracts(
             with read_errors(path):
                 for element in _elements(file):
                     rank = (element.version, _size(element), -number)
-                    if not element.deleted and best.get(_name(element)) == rank:
-                        print(_line(element), file=stream)
+                    if best.get(_name(element)) == rank:
+                        del best[_name(element)]  # write it once
+                        if not element.deleted:
+                            print(_line(element), file=stream)
     return osmium.io.File(str(merged), "opl")
 
 

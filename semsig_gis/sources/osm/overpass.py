@@ -1,13 +1,10 @@
-"""OpenStreetMap elements from Overpass servers or their JSON files, and places from Nominatim."""
+"""OpenStreetMap elements from Overpass servers, and places from Nominatim."""
 
 from __future__ import annotations
 
-import collections
 import dataclasses
 import json
 import re
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,29 +22,18 @@ from semsig_gis.sources.http.fetch import (
     host_of,
     read_text,
 )
-from semsig_gis.sources.osm.elements import (
-    KIND_BY_LETTER,
-    TagIndex,
-    add_element,
-    element_layers,
-    relation_shape,
-    require_tags,
-    way_shape,
-)
-from semsig_gis.sources.rows import WGS84, BadFeatureError
+from semsig_gis.sources.osm.documents import load_document
+from semsig_gis.sources.osm.elements import require_tags
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
+    from pathlib import Path
 
     from semsig_gis.sources.area import Tile
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
-    from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
-    from semsig_gis.sources.rows import Position
 
 JSON = ("application/json",)
 QUERY_S = 90  # time limit of a query on the server
@@ -60,161 +46,6 @@ TOO_MANY = 429
 NO_SLOT_MARGIN_S = 1.0
 # Characters with a meaning in POSIX extended regular expressions.
 SPECIAL = re.compile(r"[.^$*+?()\[\]{}|\\]")
-LONGEST_REMARK = 300
-EXHAUSTED = ("timed out", "out of memory")
-
-
-@dataclass(frozen=True, slots=True)
-class Document:
-    """Elements of an answer, and the remark of the server, which is usually empty."""
-
-    elements: list[dict[str, Any]]
-    remark: str = ""
-
-    @property
-    def exhausted(self) -> bool:
-        """Whether the answer is incomplete because the question was too large."""
-        return self.failed and any(words in self.remark for words in EXHAUSTED)
-
-    @property
-    def failed(self) -> bool:
-        """Whether the answer is incomplete."""
-        return "error" in self.remark
-
-
-def load_document(path: Path, *, where: str) -> Document:
-    """Read an answer, complete or not; SourceError if it is not from an Overpass server."""
-    try:
-        content = parse_json(path.read_bytes())
-        elements = [element for element in content["elements"] if _is_element(element)]
-        remark = " ".join(str(content.get("remark", "")).split())
-        # The remark becomes a part of a sentence.
-        return Document(elements, remark.rstrip(".").replace(". ", ", ")[:LONGEST_REMARK])
-    except OSError as error:
-        raise SourceError(
-            f"{where} cannot be read ({error.strerror}); give a JSON file of an Overpass server."
-        ) from error
-    except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
-        raise SourceError(
-            f"{where} is not JSON as Overpass servers send it; download it again."
-        ) from error
-
-
-def _is_element(element: dict[str, Any]) -> bool:
-    """Whether an item is a node, way or relation; TypeError if it is a malformed one."""
-    if element["type"] not in KIND_BY_LETTER.values():
-        return False  # for example a count
-    tags = element.get("tags", {})
-    if isinstance(element["id"], int) and all(isinstance(value, str) for value in tags.values()):
-        return True
-    raise TypeError
-
-
-def read_layers(
-    path: str | Path | Sequence[Path],
-    specs: Sequence[LayerSpec],
-    *,
-    filters: bool = True,
-    crs: str | None = None,
-) -> tuple[RawLayer, ...]:
-    """Read the layers of `specs` from a file of Overpass JSON, or from the tiles of an area.
-
-    The layers are the same as those of `sources.osm.file.read_layers`; an element in several tiles
-    counts once. SourceError if a file is not Overpass JSON or is incomplete by its own remark.
-    """
-    paths = [Path(path)] if isinstance(path, str | Path) else list(path)
-    where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} tiles"
-    layers = element_layers(specs, filters=filters, where=where)
-    if not layers:
-        return ()
-    index = TagIndex(specs)
-    known_elements: set[tuple[str, int]] = set()
-    centre_counts: collections.Counter[str] = collections.Counter()
-    for file in paths:
-        document = load_document(file, where=str(file))
-        if document.failed:
-            raise SourceError(f"{file} is incomplete ({document.remark}); ask for a smaller area.")
-        positions = _ElementPositions(document)
-        for element in document.elements:
-            name = kind, number = element["type"], element["id"]
-            # Elements without tags are only there for the positions of others.
-            if "tags" in element and name not in known_elements:
-                known_elements.add(name)
-                tags = element["tags"]
-                for layer in (layers[place] for place in index.layers(tags)):
-                    position = positions.position(element, layer.spec)
-                    accepted = add_element(layer, kind, f"{kind}/{number}", tags, position)
-                    centre_counts[layer.spec.name] += accepted and _has_only_centre(element)
-    raw = [layer.layer(WGS84, requested=crs) for layer in layers]
-    for number, raw_layer in enumerate(raw):
-        centres = centre_counts[raw_layer.spec.name]
-        if centres and raw_layer.spec.role == "objects":
-            note = f"{centres:,} elements have only the middle of their box; ask for `out geom`"
-            raw[number] = dataclasses.replace(raw_layer, notes=(*raw_layer.notes, note))
-    return tuple(raw)
-
-
-def _has_only_centre(element: dict[str, Any]) -> bool:
-    parts = (element, *element.get("members", ()))
-    return "center" in element and not any("geometry" in part for part in parts)
-
-
-class _ElementPositions:
-    """Geometries of the elements of a document.
-
-    A way has the positions of its nodes (``out geom``), only its centre (``out center``), or the
-    ids of nodes that are separate elements (``out; >; out skel``).
-    """
-
-    def __init__(self, document: Document) -> None:
-        self._by_kind: dict[str, dict[int, dict[str, Any]]] = {"node": {}, "way": {}}
-        for element in document.elements:
-            if element["type"] in self._by_kind:
-                self._by_kind[element["type"]][element["id"]] = element
-
-    def position(self, element: dict[str, Any], spec: LayerSpec) -> Position | str:
-        """Return the geometry of an element in a layer, or an error message."""
-        try:
-            return self._shape(element, spec)
-        except BadFeatureError as error:
-            return str(error)
-        except (AttributeError, KeyError, TypeError):
-            return "is not as Overpass servers send elements"
-
-    def _shape(self, element: dict[str, Any], spec: LayerSpec) -> Position:
-        if element["type"] == "node":
-            return _point(element)
-        if spec.role == "objects" and _has_only_centre(element):
-            return _point(element["center"])
-        if element["type"] == "way":
-            return way_shape(self._line(element), spec.role)
-        outer: list[NDArray[np.float64]] = []
-        inner: list[NDArray[np.float64]] = []
-        for member in element.get("members", ()):
-            if member.get("type") == "way":
-                way = member if "geometry" in member else self._by_kind["way"].get(member["ref"])
-                lines = inner if member.get("role") == "inner" else outer
-                lines.append(self._line(way or {}))
-        return relation_shape(outer, inner)
-
-    def _line(self, way: dict[str, Any]) -> NDArray[np.float64]:
-        """Return longitude and latitude of the nodes of a way, shape (n, 2)."""
-        nodes = way.get("geometry")
-        if nodes is None:
-            nodes = [self._by_kind["node"].get(number) for number in way.get("nodes", ())]
-        missing = sum(node is None for node in nodes)
-        if missing or not nodes:
-            raise BadFeatureError(
-                f"lacks {missing} of its {len(nodes)} nodes" if nodes else "has no positions"
-            )
-        return np.array([_point(node) for node in nodes])
-
-
-def _point(place: dict[str, Any]) -> tuple[float, float]:
-    try:
-        return float(place["lon"]), float(place["lat"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise BadFeatureError("has no valid position") from error
 
 
 def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAULT_HTTP) -> Area:
