@@ -37,8 +37,8 @@ def file_reader(path: Path, *, sure: bool = False) -> str | None:
     if path.name.lower().endswith((*features.FORMATS, *features.CHANGES)):
         return "osm_file"
     probe = probe_file(path)
-    if probe.format == "overpass":
-        return "overpass"
+    if probe.format in {"osm", "overpass"}:
+        return "overpass" if probe.format == "overpass" else "osm_file"
     is_osm = features.has_element_columns if sure else features.has_tag_columns
     return "osm_features" if any(map(is_osm, probe.columns)) else None
 

@@ -17,7 +17,8 @@ FILE_SUFFIXES = frozenset(
     {".bz2", ".csv", ".fgb", ".geojson", ".geoparquet", ".gml", ".gpkg", ".gz", ".json",
      ".osm", ".parquet", ".pbf", ".shp", ".zip",
      ".dxf", ".gdb", ".geojsonl", ".geojsons", ".geojsonseq", ".gpx", ".jsonl", ".kml", ".kmz",
-     ".mif", ".ndjson", ".ods", ".sqlite", ".tab", ".topojson", ".tsv", ".umap", ".xlsx"}
+     ".mif", ".ndjson", ".o5m", ".ods", ".osh", ".sqlite", ".tab",
+     ".topojson", ".tsv", ".umap", ".xlsx"}
 )  # fmt: skip
 # A shapefile consists of several files, and each may be replaced.
 SHAPEFILE_PARTS = (".shp", ".shx", ".dbf", ".prj", ".cpg")

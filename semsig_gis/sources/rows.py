@@ -157,6 +157,13 @@ MOST_UNLISTED, MOST_VALUE_CHARACTERS = 8, 40
 APART_DEGREES, APART_METRES = 1e-5, 1.0
 # Numbers in the error of an incomplete OpenStreetMap element.
 SHARE = re.compile(r"\d+ of its \d+")
+# What stands in a field of identifiers where there is none: words, or repeated numbers.
+NO_IDENTIFIER = re.compile(
+    r"[<(\[]?(?:null|none|nil|nan|#?n/?a|unknown|undefined|missing|unbekannt|inconnue?|"
+    r"sconosciuto|desconocido|onbekend)[>)\]]?|[-?.]*",
+    re.IGNORECASE,
+)
+PLACEHOLDER = re.compile(r"-?[{(]?[-0.]+[)}]?|-1|-9{2,}")
 WHOLE_FLOAT = re.compile(r"(-?\d+)\.0+")
 
 T = TypeVar("T")
@@ -176,13 +183,15 @@ class Rows:
     1, in the order of the file), `names` (the identifiers that do not come from a field) and
     `positions` are as long; a text instead of a position is the error of the row. `read` counts all
     rows, `filtered` the rows that the reader leaves out, `closed` the rows with rings that were
-    closed. `errors` has the error by row number of rows without values.
+    closed, `repeated` the rows with the identifier of an earlier one, which the reader leaves out.
+    `errors` has the error by row number of rows without values.
     """
 
     columns: dict[str, Any]
     read: int = 0
     filtered: int = 0
     closed: int = 0
+    repeated: int = 0
     errors: dict[int, str] = dataclasses.field(default_factory=dict)
     numbers: list[int] = dataclasses.field(default_factory=list)
     names: list[str] = dataclasses.field(default_factory=list)
@@ -281,11 +290,11 @@ def raw_layer(
     bad = _coordinate_errors(geometry, numbers, crs, by_file=by_file, file=rules.file)
     errors |= bad
     keep = ~np.isin(numbers, list(bad))
-    repeated = 0
+    repeated = rows.repeated
     if spec.unique_id:
         tolerance = APART_DEGREES if crs.is_geographic else APART_METRES
         first, more = _first_of_ids(columns[SOURCE_ID].to_pylist(), geometry, keep, tolerance)
-        repeated = int(keep.sum() - first.sum())
+        repeated += int(keep.sum() - first.sum())
         keep = first
         notes += more
     columns, geometry = columns.filter(pa.array(keep)), geometry[keep]
@@ -298,13 +307,17 @@ def raw_layer(
         causes = Counter(SHARE.sub("some of its", e.partition(" ")[2]) for e in errors.values())
         listed = ", ".join(f"{cause} ({number:,})" for cause, number in causes.most_common())
         notes += (f"unreadable: {listed}",)
+    size = len(geometry)
+    if spec.role == "objects":
+        columns, geometry, more = _separate_points(columns, geometry)
+        notes += more
     return RawLayer(
         spec=spec,
         columns=columns,
         geometry=geometry,
         crs=crs,
         counts=RowCounts(
-            read=rows.read,
+            read=rows.read + len(geometry) - size,
             unreadable=len(errors),
             filtered=rows.filtered + passed.filtered,
             excluded=passed.excluded,
@@ -385,6 +398,38 @@ def _first_of_ids(
     far = int((metres > tolerance).sum())
     note = f"{far} rows have the id of a row at another place; the place of the first row is used"
     return result, (note,) if far else ()
+
+
+def _separate_points(
+    columns: pa.Table, geometry: NDArray[np.object_]
+) -> tuple[pa.Table, NDArray[np.object_], tuple[str, ...]]:
+    """Return a row for each point of rows of several points, with ids such as ``12/3``, and a note.
+
+    Each point is a row of the layer, also in its counts.
+    """
+    sizes = shapely.get_num_coordinates(geometry)
+    several = (shapely.get_dimensions(geometry) == 0) & (sizes > 1)
+    if not several.any():
+        return columns, geometry, ()
+    counts = np.where(several, sizes, 1)
+    rows = np.repeat(np.arange(len(geometry)), counts)
+    numbers = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
+    points = geometry[rows]
+    points[several[rows]] = shapely.points(shapely.get_coordinates(geometry[several]))
+    columns = columns.take(pa.array(rows))
+    ids = [
+        f"{name}/{number}" if part and name else name
+        for name, number, part in zip(
+            columns[SOURCE_ID].to_pylist(), numbers.tolist(), several[rows].tolist(), strict=True
+        )
+    ]
+    place = columns.column_names.index(SOURCE_ID)
+    columns = columns.set_column(place, SOURCE_ID, pa.array(ids, pa.string()))
+    note = (
+        f"{several.sum():,} rows are MultiPoints; each of their {sizes[several].sum():,} points is "
+        "an object, counted as a row"
+    )
+    return columns, points, (note,)
 
 
 def _deviations(
@@ -538,7 +583,7 @@ class RowRules:
                 notes.append(_unlisted(columns[by.field], unlisted, by.field, name))
                 filtered += int(unlisted.sum())
                 passed &= ~unlisted
-        result = {CLASS_NAME: classes, SOURCE_ID: _texts(columns, spec.id_field, size)}
+        result = {CLASS_NAME: classes, SOURCE_ID: _ids(columns, spec.id_field, size)}
         if not spec.unique_id:
             no_id = pc.equal(result[SOURCE_ID], "")
             result[SOURCE_ID] = pc.if_else(
@@ -604,10 +649,20 @@ class RowRules:
 
 
 def _texts(columns: Mapping[str, _CodedColumn], field: str | None, size: int) -> pa.Array:
-    """Return the identifiers or names in a field, empty where there is none."""
+    """Return the names in a field, empty where there is none."""
     if field is None:
         return pa.repeat(pa.scalar(""), size)
-    return columns[field].texts(_identifier)
+    return columns[field].texts(_label)
+
+
+def _ids(columns: Mapping[str, _CodedColumn], field: str | None, size: int) -> pa.Array:
+    """Return the identifiers in a field, empty where there is none or only a placeholder."""
+    if field is None:
+        return pa.repeat(pa.scalar(""), size)
+    column = columns[field]
+    counts = np.bincount(column.codes, minlength=len(column.values))
+    ids = map(identifier, column.values, (counts > 1).tolist())
+    return pa.array(ids, pa.string()).take(pa.array(column.codes))
 
 
 def _unlisted(column: _CodedColumn, rows: NDArray[np.bool_], field: str, class_name: str) -> str:
@@ -630,10 +685,20 @@ def _first(choices: Iterable[tuple[Value, T]], value: object, default: T) -> T:
     return next((result for accepted, result in choices if matches(value, accepted)), default)
 
 
-def _identifier(value: object) -> str:
+def _label(value: object) -> str:
     text = "" if value is None else as_text(value).strip()
     whole = WHOLE_FLOAT.fullmatch(text)
     return whole[1] if whole else text
+
+
+def identifier(value: object, repeated: bool) -> str:  # noqa: FBT001 - of `map`
+    """Return the text of an identifier, empty for what stands where there is none.
+
+    Numbers such as 0 and -1 do so if they are `repeated`.
+    """
+    text = _label(value)
+    none = NO_IDENTIFIER.fullmatch(text) or (repeated and PLACEHOLDER.fullmatch(text))
+    return "" if none else text
 
 
 def _width(value: object) -> float:

@@ -13,6 +13,7 @@ from sentences import refused
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources import (
+    RowCounts,
     file_reader,
     find_files,
     frame_layers,
@@ -137,7 +138,7 @@ def test_columns_and_shapes_distinguish_ways_and_relations() -> None:
 
 def test_element_counts_once_and_unreadable_tags_are_noted() -> None:
     snapshots = frame(at_osmId=["node/1", "node/1"], amenity=["bench", "bench"])
-    assert frame_layers(snapshots, SPECS)[0].counts.read == 1
+    assert frame_layers(snapshots, SPECS)[0].counts == RowCounts(read=2, duplicates=1)
     broken = frame(feature_id=IDS, tags=["{amenity}", TREE])
     assert frame_layers(broken, SPECS)[0].notes == ("1 rows have tags that cannot be read",)
     joined = frame(feature_id=IDS, amenity=[["bench", "shelter"], "bench"])

@@ -295,12 +295,14 @@ def test_null_and_empty_geometries_are_not_errors(suffix: str, tmp_path: Path) -
 
 def test_other_geometries_are_noted() -> None:
     layer = read(DATA / "mixed.geojson", rows=(10, 20))
-    kinds = ["Point", "MultiPoint", "LineString", "Polygon", "GeometryCollection"]
+    kinds = ["Point", "Point", "Point", "LineString", "Polygon", "GeometryCollection"]
     assert layer.table.geom_type.tolist() == kinds
+    assert counts(layer) == (6, 6, 0)
     assert not layer.table.has_z.any()  # the third dimension of points is left out
     assert layer.notes == (
         "the layer has 5 rows, and 10 to 20 were expected",
         "3 of 5 rows are GeometryCollection, LineString, Polygon, not point",
+        "1 rows are MultiPoints; each of their 2 points is an object, counted as a row",
     )
 
 

@@ -12,7 +12,7 @@ import gzip
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
 from xml.etree import ElementTree as ET  # without entities, see `_read_xml`
 
 import numpy as np
@@ -27,6 +27,7 @@ from semsig_gis.sources.osm.elements import (
     relation_shape,
     way_shape,
 )
+from semsig_gis.sources.probe import BOM, ROOT, START_BYTES
 from semsig_gis.sources.rows import WGS84, BadFeatureError
 from semsig_gis.storage import parse_json
 
@@ -42,13 +43,7 @@ if TYPE_CHECKING:
 LONGEST_REMARK = 300
 EXHAUSTED = ("timed out", "out of memory")
 KINDS = frozenset(KIND_BY_LETTER.values())
-# Start of JSON text with elements: an answer of a server, or a list or lines of elements.
-START_BYTES = 4096
-ELEMENT = re.compile(rb'"type"\s*:\s*"(?:node|way|relation)"')
-BOM = b"\xef\xbb\xbf"
-# The first element of XML is before this byte; what only Overpass servers and editors write.
-XML_ROOT_BYTES = 2**16
-ROOT = re.compile(rb"<\s*(osm\w*)\b", re.IGNORECASE)
+# What only Overpass servers and editors write in XML.
 CHUNK_BYTES, OVERLAP_BYTES = 2**22, 2**10
 DIALECTS = tuple(
     map(
@@ -83,13 +78,6 @@ class Document:
         return "error" in self.remark
 
 
-def are_elements(start: bytes) -> bool:
-    """Whether JSON that starts so contains elements of OpenStreetMap."""
-    if b'"Feature' in start:
-        return False
-    return b'"elements"' in start or ELEMENT.search(start) is not None
-
-
 def load_document(path: Path, *, where: str) -> Document:
     """Read the elements of a file of JSON or XML; SourceError if it has none of OpenStreetMap."""
     try:
@@ -118,12 +106,12 @@ def load_document(path: Path, *, where: str) -> Document:
         ) from error
 
 
-def _open(path: Path) -> IO[bytes]:
+def _open(path: Path) -> BinaryIO:
     """Open a file that may be compressed."""
     suffix = path.suffix.lower()
     if suffix == ".gz":
-        return gzip.open(path)
-    return bz2.open(path) if suffix == ".bz2" else path.open("rb")
+        return cast("BinaryIO", gzip.open(path))
+    return cast("BinaryIO", bz2.open(path)) if suffix == ".bz2" else path.open("rb")
 
 
 def is_dialect(path: Path) -> bool:
@@ -136,7 +124,7 @@ def is_dialect(path: Path) -> bool:
         with _open(path) as stream:
             while chunk := stream.read(CHUNK_BYTES):
                 if not before:
-                    _check_root(path, chunk[:XML_ROOT_BYTES])
+                    _check_root(path, chunk[:START_BYTES])
                 text = before + chunk
                 if any(pattern.search(text) for pattern in DIALECTS):
                     return True
@@ -233,27 +221,27 @@ def _version(element: Mapping[str, Any]) -> int:
     return int(element.get("version") or 0)
 
 
-def _read_xml(stream: IO[bytes]) -> tuple[list[dict[str, Any]], str]:
+def _read_xml(stream: BinaryIO) -> tuple[list[dict[str, Any]], str]:
     """Return the elements of XML as in JSON, and the remark.
 
     ParseError if it is not whole, or has a document type, which could declare entities.
     """
-    parser = ET.XMLPullParser(["start", "end"])
-    depth, root, elements, remark = 0, None, [], ""
-    while chunk := stream.read(CHUNK_BYTES):
-        if root is None and b"<!DOCTYPE" in chunk[:XML_ROOT_BYTES]:
-            raise ET.ParseError("it has a document type")
-        parser.feed(chunk)
-        for event, item in parser.read_events():
-            depth += 1 if event == "start" else -1
-            root = item if root is None else root
-            if event == "end" and depth == 1:
-                if item.tag in KINDS and "id" in item.attrib:
-                    elements.append(_xml_element(item))
-                elif item.tag == "remark":
-                    remark = item.text or ""
-                root.clear()
-    parser.close()
+    if b"<!DOCTYPE" in stream.read(START_BYTES):
+        raise ET.ParseError("it has a document type")
+    stream.seek(0)
+    elements, remark = [], ""
+    path: list[ET.Element] = []
+    for event, item in ET.iterparse(stream, ["start", "end"]):  # noqa: S314 - see above
+        if event == "start":
+            path.append(item)
+            continue
+        path.pop()
+        if len(path) == 1:
+            if item.tag in KINDS and "id" in item.attrib:
+                elements.append(_xml_element(item))
+            elif item.tag == "remark":
+                remark = item.text or ""
+            path[0].clear()
     return elements, remark
 
 

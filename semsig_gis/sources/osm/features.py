@@ -10,6 +10,7 @@ import functools
 import json
 import math
 import re
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,7 +33,14 @@ from semsig_gis.sources.osm.elements import (
 )
 from semsig_gis.sources.parquet import read_parquet
 from semsig_gis.sources.probe import probe_file
-from semsig_gis.sources.rows import WGS84, BadFeatureError, built_geometries, parse_crs, plain
+from semsig_gis.sources.rows import (
+    WGS84,
+    BadFeatureError,
+    built_geometries,
+    identifier,
+    parse_crs,
+    plain,
+)
 from semsig_gis.storage import parse_toml
 
 if TYPE_CHECKING:
@@ -57,7 +65,10 @@ ESCAPED = re.compile(r"\\(.)")
 QUACKOSM = "feature_id"
 # Columns with the id of an element, such as "node/123" or "n123".
 NAMES = (QUACKOSM, "@id", "@osmId", "full_id", "osm_id", "osmid", "id")
-NAME = re.compile(r"(n|node|w|way|r|relation)/?(\d+)")
+NAME = re.compile(
+    r"(?:https?://(?:www\.)?openstreetmap\.org/)?(n|node|w|way|r|rel|relation)[/ _:]?(-?\d+)",
+    re.IGNORECASE,
+)
 # Columns with its kind and its number: osmnx from version 2, before it, QuickOSM, pyrosm, others.
 KINDS_AND_NUMBERS = (
     ("element", "id"),
@@ -112,14 +123,12 @@ class FeatureTable:
         names: list[ElementName] = [(None, "")] * size
         # Numbers without a kind (GDAL, osm2pgsql).
         among_areas = WAY_NUMBER in self.columns
-        for row, value in _valid_rows(self.columns.get(NUMBER)):
-            number = as_text(value)
-            if number.lstrip("-").isdigit():  # relations of osm2pgsql have numbers below zero
-                relation = among_areas or number.startswith("-")
-                names[row] = ("relation" if relation else None, number.lstrip("-"))
-        for row, value in _valid_rows(self.columns.get(WAY_NUMBER)):
-            if as_text(value).isdigit():
-                names[row] = ("way", as_text(value))
+        for row, number in _numbers(self.columns.get(NUMBER)):
+            # Relations of osm2pgsql have numbers below zero.
+            relation = among_areas or number.startswith("-")
+            names[row] = ("relation" if relation else None, number.lstrip("-"))
+        for row, number in _numbers(self.columns.get(WAY_NUMBER)):
+            names[row] = ("way", number)
         for row, name in self.whole_names():  # more exact
             names[row] = name
         return names
@@ -130,14 +139,14 @@ class FeatureTable:
         for kind_column, number_column in KINDS_AND_NUMBERS:
             if {kind_column, number_column} <= columns.keys() and _has_kinds(columns[kind_column]):
                 kinds = dict(_valid_rows(columns[kind_column]))
-                for row, value in _valid_rows(columns[number_column]):
-                    if row in kinds and as_text(value).isdigit():
-                        yield row, (KIND_BY_LETTER[str(kinds[row])[0].lower()], as_text(value))
+                for row, number in _numbers(columns[number_column]):
+                    if row in kinds:
+                        yield row, (KIND_BY_LETTER[str(kinds[row])[0].lower()], number)
         for column in NAMES:
             for row, value in _valid_rows(columns.get(column)):
                 match = NAME.fullmatch(value) if isinstance(value, str) else None
-                if match:
-                    yield row, (KIND_BY_LETTER[match[1][0]], match[2])
+                if match and int(match[2]):
+                    yield row, (KIND_BY_LETTER[match[1][0].lower()], match[2])
 
 
 def read_layers(
@@ -190,6 +199,8 @@ def _table_layers(
             name = f"{kind}/{element_number}" if element_number else ""
             for number in numbers:
                 if name and (number, name) in known_names:
+                    layers[number].rows.read += 1
+                    layers[number].rows.repeated += 1
                     continue
                 known_names.add((number, name))
                 shape = _element_shape(position, layers[number].spec)
@@ -294,6 +305,15 @@ def _valid_rows(values: Sequence[Any] | None) -> Iterator[tuple[int, Any]]:
     for row, value in enumerate(values or ()):
         if value is not None and not (isinstance(value, float) and math.isnan(value)):
             yield row, value
+
+
+def _numbers(values: Sequence[Any] | None) -> Iterator[tuple[int, str]]:
+    """Yield the rows of a column with a whole number that is not only a placeholder, and it."""
+    counts = Counter(map(as_text, values or ()))
+    for row, value in _valid_rows(values):
+        number = identifier(value, counts[as_text(value)] > 1)
+        if number.lstrip("-").isdigit() and int(number):
+            yield row, number
 
 
 def _tag_value(value: object) -> str:
