@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from semsig_gis.core import Taxonomy
 
 LEAST_TURN = 0.001
+LEAST_RANGE_M = 0.01
+LEAST_RANGE_ERROR = 0.001
 MOST_RANGE_ERROR = 3.0
 ROUNDING = 1e-6  # tolerance of sums of scores
 EDGE = 0.05  # degrees; tolerance for bearings and sectors that were rounded before
@@ -196,13 +198,13 @@ class View(Signature):
     codes, bearings : ndarray, shape (n,), or None
         As in `Signature`; `ranges` and sectors require the bearings.
     ranges : ndarray of float64, shape (n,), or None
-        Rough distance of each object in metres, NaN if unknown.
+        Rough distance of each object in metres, from 0.01 to 6,000; NaN if unknown.
     range_errors : ndarray of float64, shape (n,), or None
-        Relative error of each distance, the standard deviation of its logarithm, above 0 and up to
+        Relative error of each distance, the standard deviation of its logarithm, from 0.001 to
         3; NaN for that of the noise model.
     bearing_errors : ndarray of float64, shape (n,), or None
         Error of each bearing in degrees in addition to that of the noise model, a standard
-        deviation above 0 and up to 180; NaN for none. Distances ignore it.
+        deviation from 0.001 to 180; NaN for none. Distances ignore it.
     scores : ndarray of float64, shape (n, 256), or None
         The probability of each class code for each object, by the detector; each row sums to one.
         Code 0 is for any class.
@@ -272,18 +274,18 @@ class View(Signature):
                     "give one for each."
                 )
         limits = {
-            "ranges": MAX_RANGE_M,
-            "range_errors": MOST_RANGE_ERROR,
-            "bearing_errors": FULL_TURN / 2.0,
+            "ranges": (LEAST_RANGE_M, MAX_RANGE_M),
+            "range_errors": (LEAST_RANGE_ERROR, MOST_RANGE_ERROR),
+            "bearing_errors": (LEAST_TURN, FULL_TURN / 2.0),
         }
-        for name, most in limits.items():
+        for name, (least, most) in limits.items():
             value = getattr(self, name)
             if value is not None and len(
-                bad := value[~(np.isnan(value) | (value > 0)) | (value > most)]
+                bad := value[~(np.isnan(value) | (value >= least)) | (value > most)]
             ):
                 what = name.replace("_", " ").removesuffix("s")
                 raise InputError(
-                    f"a {what} is {bad[0]:g}; give a number above 0 and up to {most:,.0f}."
+                    f"a {what} is {bad[0]:g}; give a number from {least:g} to {most:,.0f}."
                 )
         if self.scores is not None and len(self.scores):
             sums = self.scores.sum(axis=1)

@@ -489,14 +489,15 @@ def test_sentence_has_one_answer_whoever_reads_it(city: Path, run_ok: RunOk) -> 
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
 def test_every_query_has_an_answer_or_an_error(city: Path, run: Run, method: str) -> None:
     rows = ['{"types": "DX"}', "{", '{"id": "\\ud800", "types": "D!"}', '{"bearings": []}']
+    rows.append('{"types": "DL", "bearings": [40, 80], "ranges": [1e-30, 12]}')
     (city / "queries.jsonl").write_text("\n".join(rows))
     batch = "localize few.parquet --queries queries.jsonl --method", method
     code, out, err = run(*batch)
-    assert (code, "2 of 4 queries" in err) == (0, True)
+    assert (code, "3 of 5 queries" in err) == (0, True)
     answers = [json.loads(line) for line in out.splitlines()]
-    assert [answer["line"] for answer in answers] == [1, 2, 3, 4]
-    assert [answer["id"] for answer in answers] == [1, 2, "\ud800", 4]
-    assert ["error" in answer for answer in answers] == [False, True, True, False]
+    assert [answer["line"] for answer in answers] == [1, 2, 3, 4, 5]
+    assert [answer["id"] for answer in answers] == [1, 2, "\ud800", 4, 5]
+    assert ["error" in answer for answer in answers] == [False, True, True, False, True]
     assert "the map has no crossing, " in answers[0]["notes"][0]
     assert "nothing was seen" in answers[3]["notes"][0]
     (city / "queries.jsonl").write_text(rows[1])

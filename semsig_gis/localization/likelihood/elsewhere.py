@@ -138,6 +138,8 @@ def goodness_of_fit(
         detections = PhotoTable.of(photo, index.table)
         look = photo.photos[0].turned(heading)
         inside = look.sees(BINS) if look.sectors else np.ones(len(BINS), np.bool_)
+        if not inside.any():  # the sectors are narrower than a degree
+            inside[int(sum(look.sectors[0]) / 2.0) % len(BINS)] = True
         rows = ((detections.bearings + heading) % FULL_TURN).astype(np.int64)
         errors = detections.bearing_errors.tolist()
         means, sums, logs_of = {}, {}, {}  # by error

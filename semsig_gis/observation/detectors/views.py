@@ -23,7 +23,14 @@ from semsig_gis.core import (
 from semsig_gis.observation.detectors.camera import USUAL_FOV, Camera, Projection
 from semsig_gis.observation.detectors.exif import PANORAMAS, read_exif
 from semsig_gis.observation.detectors.pictures import Shot, same_shape
-from semsig_gis.observation.view import CLASSES, MOST_RANGE_ERROR, Photo, View
+from semsig_gis.observation.view import (
+    CLASSES,
+    LEAST_RANGE_ERROR,
+    LEAST_RANGE_M,
+    MOST_RANGE_ERROR,
+    Photo,
+    View,
+)
 from semsig_gis.sources import built_in_taxonomy
 from semsig_gis.storage import read_rows, row_value
 
@@ -409,11 +416,13 @@ def locate_boxes(
     whole = whole & ((corners > margin) | (np.arange(4) >= 2)).all(axis=1)  # noqa: PLR2004
     whole &= ((corners < scale - margin) | (np.arange(4) < 2)).all(axis=1)  # noqa: PLR2004
     ranges: NDArray[np.float64] = np.where(whole, heights[:, 0] / objects.rises, np.nan)
-    ranges[~(ranges <= MAX_RANGE_M)] = np.nan
+    ranges[~((ranges >= LEAST_RANGE_M) & (ranges <= MAX_RANGE_M))] = np.nan
     errors: NDArray[np.float64] = np.hypot(
         heights[:, 1] / heights[:, 0], EDGE_ERROR_PIXELS / objects.pixels
     )
-    errors = np.where(np.isnan(ranges), np.nan, np.minimum(errors, MOST_RANGE_ERROR))
+    errors = np.where(
+        np.isnan(ranges), np.nan, np.clip(errors, LEAST_RANGE_ERROR, MOST_RANGE_ERROR)
+    )
     return objects.bearings, ranges, errors
 
 

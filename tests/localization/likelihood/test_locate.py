@@ -10,12 +10,13 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import database_of, noisy_town, parts_of, random_database, turned_query
+from sentences import assert_sentence
 from worlds import CODES, CORNER, World, random_town
 
-from semsig_gis.core import ObjectIndex, Signature
+from semsig_gis.core import InputError, ObjectIndex, Signature
 from semsig_gis.database import ObjectStore, visible_objects_at
 from semsig_gis.localization import (
     AnswerRule,
@@ -35,7 +36,7 @@ from semsig_gis.localization import (
     refine,
     refined_estimate,
 )
-from semsig_gis.observation import Leg, View
+from semsig_gis.observation import Leg, Photo, View
 
 if TYPE_CHECKING:
     from semsig_gis.objects import StreetObjects
@@ -538,3 +539,48 @@ def test_versions_are_mixed_by_their_evidence() -> None:
     assert (same.estimate.x, same.estimate.y) == pytest.approx(
         (single.estimate.x, single.estimate.y)
     )
+
+
+# Numbers of a view that it refuses, and the least and greatest that it takes.
+REFUSED = [-math.inf, -3.0, 1e-308, 1e-30, 1e9, math.inf]
+BEARING = st.sampled_from([0.0, 10.0, 10.0, 190.0, 359.9])
+RANGE = st.sampled_from([math.nan, 0.01, 12.0, 6000.0])
+RANGE_ERROR = st.sampled_from([math.nan, 0.001, 3.0])
+BEARING_ERROR = st.sampled_from([math.nan, 0.001, 180.0])
+SEEN = st.tuples(st.sampled_from([*CODES, 0]), BEARING, RANGE, RANGE_ERROR, BEARING_ERROR)
+
+
+@settings(max_examples=20)
+@given(
+    st.lists(SEEN, min_size=1, max_size=4),
+    st.none() | st.tuples(st.integers(1, 4), st.sampled_from(REFUSED)),
+    st.sampled_from([None, 0.0, 0.001, 360.0, math.inf]),
+    st.sampled_from([0.001, 1.0, 90.0, 360.0]),
+)
+def test_view_of_any_numbers_is_refused_or_answered_with_chances(
+    rows: list[tuple[float, ...]],
+    bad: tuple[int, float] | None,
+    north: float | None,
+    width: float,
+) -> None:
+    columns = np.array(rows).T
+    if bad is not None:
+        columns[bad[0], 0] = bad[1]
+    codes, bearings, ranges, range_errors, bearing_errors = columns
+    photo = Photo(sectors=() if width == 360.0 else ((10.0, 10.0 + width),), north_sigma=north)
+    try:
+        view = View(
+            codes.astype(np.uint8),
+            bearings,
+            ranges=ranges,
+            range_errors=range_errors,
+            bearing_errors=bearing_errors,
+            photos=(photo,),
+        )
+    except InputError as error:
+        assert_sentence(error)
+        assert bad is not None
+        return
+    answer = locate(INDEX, view, refined=False, explained=0)
+    assert np.isfinite(answer.chances).all()
+    assert json.dumps(answer.to_dict(), allow_nan=False)
