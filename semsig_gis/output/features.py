@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 import pyogrio
+from pyogrio._err import CPLE_BaseError  # of GDAL, where pyogrio passes it on
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
 from semsig_gis.core import GEOMETRY, InputError, epsg_code
@@ -77,11 +78,11 @@ def write_features(
             **(geometry if layer.geometry in GEOMETRY_TYPES else {}),
             **options,
         )
-    except RuntimeError:
+    except (RuntimeError, CPLE_BaseError) as error:
         # pyogrio raises this in place of an error of the stream, such as an interruption.
         if errors:
             raise errors[0] from None
-        raise
+        raise DataSourceError(str(error)) from error
 
 
 def geojson_options(description: str, metadata: Mapping[str, Any]) -> dict[str, str]:

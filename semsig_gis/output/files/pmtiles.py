@@ -8,9 +8,13 @@ import math
 import sqlite3
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pyarrow as pa
+import shapely
 from pmtiles.tile import Compression, TileType, zxy_to_tileid
 from pmtiles.writer import Writer
+from pyogrio.errors import DataSourceError
+from pyproj import Transformer
 
 from semsig_gis.core import GEOMETRY, InputError, to_degrees
 from semsig_gis.output.features import write_errors, write_features
@@ -28,7 +32,7 @@ OMITTED_COLUMNS = {"x", "y", "bearings", "levels", "distances"}
 """Columns of cells that tiles omit, because coordinates in tiles are rounded."""
 
 TILE_PIXELS = 512
-EQUATOR = 40_075_016.7  # metres
+EQUATOR = 40_075_016.685578  # metres
 CELL_PIXELS, CITY_PIXELS = 4, 64  # smallest width of a cell and of a city on the screen
 LARGEST_ZOOM = 22
 # No tile is truncated for its size; neighbours overlap by two pixels, so that no seam is visible.
@@ -120,7 +124,23 @@ def _tiles(layer: Layer, zoom: int, scratch: Path) -> Iterator[tuple[int, bytes]
         # MBTiles count rows from the south, PMTiles from the north.
         north, query = (1 << zoom) - 1, "SELECT tile_column, tile_row FROM tiles"
         places = {zxy_to_tileid(zoom, x, north - y): (x, y) for x, y in tiles.execute(query)}
+        # GDAL reports no error if the disk is full while it writes them.
+        if not _expected(layer, zoom) <= places.keys():
+            raise DataSourceError("some tiles are not in the file")
         query = "SELECT tile_data FROM tiles WHERE tile_column = ? AND tile_row = ?"
         for number, place in sorted(places.items()):
             yield number, tiles.execute(query, place).fetchone()[0]
     scratch.unlink()
+
+
+def _expected(layer: Layer, zoom: int) -> set[int]:
+    """Return the ids of the tiles that have the centre of a row."""
+    to_map, side = Transformer.from_crs(layer.crs, "EPSG:3857", always_xy=True), 1 << zoom
+    found: set[int] = set()
+    for block in layer.blocks():
+        centres = shapely.get_coordinates(shapely.centroid(shapely.from_wkb(block[GEOMETRY])))
+        x, y = to_map.transform(*centres.T)
+        columns, rows = (np.array([x, -y]) / EQUATOR + 0.5) * side
+        tiles = np.unique(np.floor(np.stack([columns, rows], axis=1)).astype(np.int64), axis=0)
+        found.update(zxy_to_tileid(zoom, *tile) for tile in tiles.tolist())
+    return found

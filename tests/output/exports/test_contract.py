@@ -6,7 +6,7 @@ import dataclasses
 import io
 import json
 import zipfile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import geopandas as gpd
 import numpy as np
@@ -14,6 +14,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pyogrio
 import pytest
+from pyogrio._err import CPLE_FileIOError
 from pyproj import CRS
 from sentences import refused
 from small_city import chances_of, small_city, small_evaluation, small_ground
@@ -183,6 +184,25 @@ def test_interruption_leaves_the_old_file(suffix: str, tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         export(file, "cells", progress=stop)
     assert file.read_bytes() == before
+    assert [*tmp_path.iterdir()] == [file]
+
+
+@pytest.mark.parametrize("error", [RuntimeError, CPLE_FileIOError])
+@pytest.mark.parametrize("suffix", ["fgb", "geojson", "gpkg", "pmtiles"])
+def test_any_error_of_gdal_is_one_sentence(
+    suffix: str, error: type[Exception], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / f"a.{suffix}"
+    file.write_bytes(b"old")
+    failed = error("disk") if error is RuntimeError else error(3, 3, "disk")
+
+    def write(*_: object, **__: object) -> NoReturn:
+        raise failed
+
+    monkeypatch.setattr(pyogrio, "write_arrow", write)
+    with refused(InputError, file.name, "unchanged"):
+        export(file, "cells")
+    assert file.read_bytes() == b"old"
     assert [*tmp_path.iterdir()] == [file]
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import sqlite3
+from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
 import numpy as np
@@ -12,15 +14,21 @@ import pmtiles.reader
 import pytest
 from machine import unavailable
 from pyproj import Transformer
+from sentences import refused
 from servers import Answer, Server, published
 from small_city import chances_of, small_city
 
+from semsig_gis.core import InputError
 from semsig_gis.output import export_database
+from semsig_gis.output.features import write_features
+from semsig_gis.output.files import pmtiles as pmtiles_module
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from selenium.webdriver import Chrome
+
+    from semsig_gis.output.layers.model import Layer
 
 CITY, _ = small_city()
 CHANCES = chances_of(CITY)
@@ -55,6 +63,28 @@ def test_tiles_contain_every_cell(file: Path) -> None:
     assert cells["chance_found"].tolist() == pytest.approx(CHANCES.found.tolist())
     middles = gpd.GeoSeries.from_xy(*CITY.xy.T, index=cells.index, crs=CITY.crs)
     assert cells.geometry.centroid.distance(middles).max() < 0.5
+
+
+@pytest.mark.parametrize(
+    "lost", ["1", "zoom_level = 15", "tile_id IN (SELECT max(tile_id) FROM map)"]
+)
+def test_tiles_that_gdal_loses_without_an_error_are_noticed(
+    lost: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a full disk, where GDAL may end without an error."""
+
+    def losing(layer: Layer, path: Path, *arguments: Any, **options: Any) -> None:  # noqa: ANN401
+        write_features(layer, path, *arguments, **options)
+        with closing(sqlite3.connect(path)) as tiles, tiles:
+            tiles.execute(lost)
+
+    path = tmp_path / "city.pmtiles"
+    path.write_bytes(b"old")
+    monkeypatch.setattr(pmtiles_module, "write_features", losing)
+    with refused(InputError, "city.pmtiles", "unchanged"):
+        export_database(CITY, path)
+    assert path.read_bytes() == b"old"
+    assert [*tmp_path.iterdir()] == [path]
 
 
 def test_squares_at_low_zooms_add_up_to_the_city(file: Path) -> None:
