@@ -220,9 +220,11 @@ class LoadOptions:
         )
 
     def _summary(self, report: street_objects.QualityReport) -> Iterator[str]:
-        from semsig_gis.output import quality_sentence
+        from semsig_gis.output import lost_sentence, quality_sentence
 
         yield quality_sentence(report)
+        if lost := lost_sentence(report):
+            yield lost
 
     def _tables(self, report: street_objects.QualityReport) -> Iterator[Table]:
         from semsig_gis.output import quality_tables

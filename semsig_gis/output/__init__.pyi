@@ -160,6 +160,7 @@ from .tables.identifiability import check_tables as check_tables
 from .tables.identifiability import identifiability_page as identifiability_page
 from .tables.identifiability import identifiability_sentence as identifiability_sentence
 from .tables.identifiability import identifiability_tables as identifiability_tables
+from .tables.quality import lost_sentence as lost_sentence
 from .tables.quality import quality_sentence as quality_sentence
 from .tables.quality import quality_tables as quality_tables
 from .tables.quality import update_sentence as update_sentence

@@ -16,6 +16,7 @@ import pytest
 from sentences import sentence
 
 import semsig_gis.cli.app  # noqa: F401 - with the command of the workbench
+from semsig_gis.cli.console import PIPED_WIDTH
 from semsig_gis.commands import Result, command_line, commands
 from semsig_gis.commands.schema import command_schema
 from semsig_gis.evaluation.identifiability import analysis
@@ -75,6 +76,10 @@ OTHERS: dict[tuple[str, str], tuple[dict[str, str], str]] = {
 # They need a network, a browser or much data; tests of their own run them.
 NOT_RUN = {"fetch", "serve", "benchmark", "reproduce"}
 RUN = [name for name in COMMANDS if name not in NOT_RUN]
+
+
+# Their output is the content of a file.
+FOR_FILES = {"draft", "schema"}
 
 
 def line_of(name: str, /, **changes: str) -> list[str]:
@@ -178,6 +183,9 @@ def test_verbose_reports_on_standard_error(name: str, run: Run) -> None:
     assert code == 0
     assert out
     assert all(line.startswith("semsig: ") for line in err.splitlines())
+    if name not in FOR_FILES:
+        lines = [line for line in out.splitlines() if not line.startswith("  ")]  # no commands
+        assert [line for line in lines if len(line) > PIPED_WIDTH] == []
 
 
 @pytest.mark.usefixtures("unchanged")

@@ -11,7 +11,7 @@ from semsig_gis.output.tables.tables import brief_notes, distortion_rows, note_t
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from semsig_gis.database import UpdateReport
     from semsig_gis.objects import QualityReport
@@ -21,7 +21,18 @@ ROW_COUNTS = tuple(field.name for field in fields(RowCounts))
 FREQUENT = 3  # classes in the sentence of a load
 NOTES_SHOWN = 4  # per layer; one with many unreadable rows would have too many
 # Tables that are omitted when they have no rows.
-MAY_BE_EMPTY = frozenset({"Objects by family", "Texts", "Conflated", "Layers not read"})
+MAY_BE_EMPTY = frozenset(
+    {"Objects by family", "Notes by layer", "Texts", "Conflated", "Layers not read"}
+)
+EMPTY_NAMED = 12  # layers without rows that are named
+# Rows that a load loses though the catalogue asks for them.
+LOST = {
+    "unreadable": "unreadable",
+    "missing": "without a position",
+    "outside": "outside the area",
+    "misplaced": "off the Earth or far from all others",
+    "duplicates": "with the id of another row",
+}
 
 
 def quality_tables(report: QualityReport) -> tuple[Table, ...]:
@@ -35,8 +46,8 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
     Returns
     -------
     tuple of Table
-        Four tables; if there are any, also a table of families, of texts, of layers that were not
-        read, of conflated objects and of notes.
+        Four tables; if there are any, also a table of families, of notes by layer, of texts, of
+        layers that were not read, of conflated objects and of notes.
 
     Examples
     --------
@@ -53,6 +64,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
         _family_table(report),
         _class_table(report),
         _layer_table(report),
+        Table("Notes by layer", ("layer", "note"), tuple(_layer_notes(report)), labels=2),
         Table(
             "Layers not read",
             ("layer", "class", "objects"),
@@ -162,34 +174,50 @@ def _class_table(report: QualityReport) -> Table:
 
 
 def _layer_table(report: QualityReport) -> Table:
-    counts = [asdict(item.counts) for item in report.sources]
+    filled = [item for item in report.sources if item.counts.read]
+    counts = [asdict(item.counts) for item in filled]
     # Columns that are 0 in all layers are listed below the table to save width.
-    empty = [name for name in ROW_COUNTS[1:] if not any(count[name] for count in counts)]
-    columns = [name for name in ROW_COUNTS if name not in empty]
+    zero = [name for name in ROW_COUNTS[1:] if not any(count[name] for count in counts)]
+    columns = [name for name in ROW_COUNTS if name not in zero]
+    notes = [f"0 in all layers: {', '.join(zero)}."] if zero else []
+    empty = [item.name for item in report.sources if not item.counts.read]
+    if empty:
+        more = f" and {len(empty) - EMPTY_NAMED} more" if len(empty) > EMPTY_NAMED else ""
+        are = "1 layer is" if len(empty) == 1 else f"{len(empty)} layers are"
+        notes.append(f"{are} empty: {', '.join(empty[:EMPTY_NAMED])}{more}.")
     return Table(
         "Rows by layer",
-        ("layer", *columns, "kept", "notes"),
+        ("layer", *columns, "kept"),
         tuple(
-            (
-                item.name,
-                *(f"{count[name]:,}" for name in columns),
-                *(f"{item.counts.kept:,}", _notes_text(item.notes)),
-            )
-            for item, count in zip(report.sources, counts, strict=True)
+            (item.name, *(f"{count[name]:,}" for name in columns), f"{item.counts.kept:,}")
+            for item, count in zip(filled, counts, strict=True)
         ),
-        note=f"0 in all layers: {', '.join(empty)}." if empty else "",
+        note=" ".join(notes),
         minor=tuple(columns[1:]),
     )
+
+
+def _layer_notes(report: QualityReport) -> Iterator[tuple[str, str]]:
+    """Yield each note with the layers that it is about."""
+    layers: dict[str, list[str]] = {}
+    for item in report.sources:
+        if item.counts.read:
+            for note in _shown_notes(item.notes):
+                layers.setdefault(note, []).append(item.name)
+    yield from ((", ".join(dict.fromkeys(names)), note) for note, names in layers.items())
 
 
 def _decimal_text(number: float | None) -> str:
     return "" if number is None else f"{number:,.1f}"
 
 
-def _notes_text(layer_notes: Sequence[str]) -> str:
+def _shown_notes(layer_notes: Sequence[str]) -> list[str]:
+    """Return the notes on a layer, at most `NOTES_SHOWN`, and no rows if their causes are noted."""
     notes = list(brief_notes(layer_notes))
+    if any(note.startswith("unreadable: ") for note in notes):
+        notes = [note for note in notes if not note.startswith("row ")]
     more = len(notes) - NOTES_SHOWN
-    return "; ".join([*notes[:NOTES_SHOWN], *([f"and {more} more (--json)"] if more > 0 else [])])
+    return [*notes[:NOTES_SHOWN], *([f"and {more} more (--json)"] if more > 0 else [])]
 
 
 def quality_sentence(report: QualityReport) -> str:
@@ -202,6 +230,16 @@ def quality_sentence(report: QualityReport) -> str:
         f"{_many(report.objects, 'street object')} of {_many(len(report.classes), 'class', 'es')} "
         f"on {report.hull_km2:,.2f} km² {report.town}: {names}{more}.{_origins(report)}"
     )
+
+
+def lost_sentence(report: QualityReport) -> str:
+    """Return how many rows of all layers are lost and why; empty if none is."""
+    totals = {
+        words: sum(getattr(item.counts, name) for item in report.sources)
+        for name, words in LOST.items()
+    }
+    lost = [f"{number:,} {words}" for words, number in totals.items() if number]
+    return f"Rows left out: {', '.join(lost)}; --tables lists them by layer." if lost else ""
 
 
 def _origins(report: QualityReport) -> str:

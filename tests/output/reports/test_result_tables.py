@@ -46,6 +46,7 @@ from semsig_gis.output import (
     evaluation_tables,
     identifiability_page,
     identifiability_tables,
+    lost_sentence,
     quality_tables,
     update_tables,
     write_report,
@@ -365,9 +366,29 @@ def test_empty_parts_of_tables_and_reports_are_omitted() -> None:
     assert {number.ours for number in ranks.numbers} == {None}
     columns = {number.column for section in page.sections for number in section.numbers}
     assert "objects" not in columns
-    objects, *others = quality_tables(replace(LOAD, conflated=(), absent=(), unread=()))
+    still = replace(LOAD.sources[0], notes=())
+    silent = replace(LOAD, sources=(still,), conflated=(), absent=(), unread=())
+    objects, *others = quality_tables(silent)
     assert objects.note.endswith("of the class.")
     assert [table.title for table in others] == ["Rows by layer", "Place", "Licences"]
+    assert lost_sentence(replace(silent, sources=())) == ""
+
+
+def test_layers_without_rows_are_a_line_below_the_others() -> None:
+    empty = [
+        LayerReport(f"empty {number}", RowCounts(read=0), notes=("the layer has no rows",))
+        for number in range(23)
+    ]
+    causes = ("unreadable: lacks nodes (2)", "row 1: way/7 lacks nodes", "row 2: way/9 lacks nodes")
+    ways = LayerReport("ways", RowCounts(read=9, unreadable=2, missing=1), notes=causes)
+    twin = replace(ways, name="twin")
+    report = replace(LOAD, sources=(*empty, ways, twin))
+    tables = {table.title: table for table in quality_tables(report)}
+    assert [row[0] for row in tables["Rows by layer"].rows] == ["ways", "twin"]
+    assert "23 layers are empty: empty 0, " in tables["Rows by layer"].note
+    assert tables["Rows by layer"].note.endswith(" and 11 more.")
+    assert tables["Notes by layer"].rows == (("ways, twin", causes[0]),)
+    assert "4 unreadable, 2 without a position;" in lost_sentence(report)
     objects, _ = update_tables(replace(UPDATE, kept=("signs",), replaced=("trees",), classes=()))
     assert objects.note == "Layers replaced: trees. Layers that stay as they were: signs."
     assert objects.rows == (("all", *["0"] * 7, ""),)
