@@ -9,6 +9,7 @@ from semsig_gis.core import InputError
 from semsig_gis.sources.files import file_reader
 from semsig_gis.sources.paths import files_in, is_folder, require_file
 from semsig_gis.sources.probe import probe_file
+from semsig_gis.sources.vector.formats import OTHERS, suffix_error
 from semsig_gis.storage import file_kind
 
 if TYPE_CHECKING:
@@ -63,6 +64,8 @@ def _unknown(file: Path) -> str:
             f"{file} is a picture, and maps are read here; mark what is seen on it with `semsig "
             "serve`, or give the boxes of a detector to `semsig view`."
         )
+    if file.suffix.lower() in OTHERS:
+        return str(suffix_error(file))
     kind = file_kind(file) if file.suffix.lower() == ".parquet" else ""
     if kind in USES:
         return f"{file} is a {kind} file, which is read already; {USES[kind]}."

@@ -415,12 +415,12 @@ WRONG_FILES: list[tuple[str, str, bytes, str]] = [
     ("opendatasoft", "a.json", b'[{"a": "\xe9"}]', "is not UTF-8 text"),
     ("opendatasoft", "a.csv", b"\xef\xbb\xbf \n", "is empty"),
     ("opendatasoft", "a.csv", b"a;b\n1;2\n", "geometry_field"),
-    ("opendatasoft", "a.png", b"\x89PNG\r\n\x1a\n\0\0", "unknown encoding"),
+    ("opendatasoft", "a.png", b"\x89PNG\r\n\x1a\n\0\0", "its content is a picture"),
     ("opendatasoft", "a.gpkg", b"SQLite", "a.gpkg"),
     ("opendatasoft", "a.parquet", b"PAR1" + bytes(100), "whole Parquet"),
     ("opendatasoft", "a.parquet", b"PAR1", "whole Parquet"),
     ("wfs", "a.gml", b"<!DOCTYPE html><html/>", "web page"),
-    ("wfs", "a.gml", b"<kml/>", "has no features"),
+    ("wfs", "a.gml", b"<kml/>", "its content is KML: rename it to end with .kml"),
     ("wfs", "a.gml", REPORT, "contains the error No"),
 ]  # fmt: skip
 

@@ -26,7 +26,7 @@ from semsig_gis.sources.services.gml import (
     read_feature,
     stated_crs,
 )
-from semsig_gis.sources.vector.formats import require_data
+from semsig_gis.sources.vector.formats import require_text
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def open_table(path: Path) -> ServiceTable:
     require_file(path, "a file that a service sends")
     with path.open("rb") as stream:
         start = stream.read(4096).removeprefix(b"\xef\xbb\xbf").lstrip()
-    require_data(path, start)
+    require_text(path, start)
     if start.startswith(b"PAR1"):
         return _parquet(path)
     if start.startswith((b"{", b"[")):

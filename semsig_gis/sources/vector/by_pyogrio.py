@@ -20,7 +20,7 @@ from pyogrio.raw import open_arrow, read
 from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.rows import Rows, plain, usable_crs
-from semsig_gis.sources.vector.formats import DXF, GEOJSON, GEOPACKAGE, GPX, SHAPEFILE
+from semsig_gis.sources.vector.formats import DXF, GEOJSON, GEOPACKAGE, GPX, SHAPEFILE, SQLITE
 from semsig_gis.sources.vector.geojson import parse_geojson
 from semsig_gis.sources.vector.member import (
     NOT_UTF8,
@@ -92,7 +92,7 @@ def describe(member: Member, *, bounds: bool = False) -> LayerDescription:
         if complete and not bounds:
             return geojson
     info = _info(member)
-    if info["driver"] != member.driver:
+    if info["driver"] != member.driver and not {info["driver"], member.driver} <= SQLITE:
         raise SourceError(
             f"{member} is not the kind of file that its name says; download it again."
         )

@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pyogrio import read_info
 from pyogrio.raw import read
 
 from semsig_gis.core import SourceError
@@ -28,18 +29,21 @@ from semsig_gis.sources.paths import file_stamp, is_geodatabase, require_file
 from semsig_gis.sources.vector.by_pyogrio import layer_names
 from semsig_gis.sources.vector.formats import (
     ARCHIVES,
+    CSV,
     DRIVERS,
     GEODATABASE,
     GEOJSON,
+    GPX,
     SHAPEFILE,
     STREAMED,
     WORKBOOKS,
     accepted,
     content_error,
+    require_text,
     suffix_error,
 )
 from semsig_gis.sources.vector.json_forms import UNREADABLE, converted
-from semsig_gis.sources.vector.member import Copy, Member, unreadable
+from semsig_gis.sources.vector.member import START_BYTES, Copy, Member, unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -126,7 +130,7 @@ def _names(path: Path, what: object) -> list[str]:
         raise
     except _ZIP_FAULTS as error:
         with path.open("rb") as stream:
-            start = stream.read(4096)
+            start = stream.read(START_BYTES)
         if start.startswith(b"PK"):
             raise unreadable(what, error) from error
         raise content_error(what, start) from error
@@ -162,23 +166,56 @@ def _unzipped(path: Path) -> Member:
 
 def _prepared(member: Member) -> Iterable[Member]:
     """Return the layers of a file with their copies, if GDAL cannot open it as it is."""
+    if member.driver == CSV:
+        with member.open() as stream:
+            require_text(member, stream.read(START_BYTES))
     if member.driver == GEOJSON:
         return _from_json(member)
     if member.driver in WORKBOOKS:
         return _from_workbook(member)
+    if member.driver == GPX:
+        return [_waypoints(member)]
     if member.driver == SHAPEFILE and member.sibling(".shx") is None:
         return [_indexed(member)]
     return [member]
 
 
+def _waypoints(member: Member) -> Member:
+    """Return a GPX file with a note on its tracks; SourceError if it has nothing else."""
+    member.require_sound()
+    try:
+        counts = {
+            layer: read_info(member.address, layer=layer, force_feature_count=True)["features"]
+            for layer in ("waypoints", "routes", "tracks")
+        }
+    except Exception as error:
+        raise unreadable(member, error) from error
+    ways = f"{counts['tracks']:,} tracks and {counts['routes']:,} routes"
+    if counts["waypoints"] or not counts["tracks"] + counts["routes"]:
+        notes = (f"{ways} are left out",) if counts["tracks"] + counts["routes"] else ()
+        return replace(member, notes=notes)
+    raise SourceError(
+        f"{member} has {ways}, but no waypoints, which are the places of objects; give a file with "
+        "waypoints."
+    )
+
+
 def _from_json(member: Member) -> Iterator[Member]:
     try:
         with member.open() as stream:
-            layers = converted(stream.read().decode("utf-8-sig", errors="replace"))
+            content = stream.read()
+        encoding = json.detect_encoding(content)
+        text = content.decode(encoding, errors="replace")
+        layers = converted(text)
     except (OSError, ValueError) as error:
         raise unreadable(member, error) from error
-    if layers is None:
+    if layers is None and encoding.startswith("utf-8"):
         yield member
+        return
+    if layers is None:
+        copy = Copy(f"{member.path.stem}.geojson")
+        copy.path.write_text(text, encoding="utf-8")
+        yield replace(member, copy=copy)
         return
     stem = member.path.stem
     for name, records in layers.items():

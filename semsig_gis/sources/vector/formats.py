@@ -25,6 +25,7 @@ SHAPEFILE = "ESRI Shapefile"
 SHEETS = "XLSX"
 DRIVERS: dict[str, str] = {
     ".csv": CSV,
+    ".db": "SQLite",
     ".dxf": DXF,
     ".fgb": "FlatGeobuf",
     ".gdb": GEODATABASE,
@@ -41,7 +42,9 @@ DRIVERS: dict[str, str] = {
     ".ndjson": GEOJSON,
     ".ods": "ODS",
     ".shp": SHAPEFILE,
+    ".spatialite": "SQLite",
     ".sqlite": "SQLite",
+    ".sqlite3": "SQLite",
     ".tab": "MapInfo File",
     ".topojson": GEOJSON,
     ".tsv": CSV,
@@ -92,7 +95,7 @@ PROJECT = "is a project, which only names the files of its layers; give these fi
 OTHERS = {
     suffix: sentence
     for suffixes, sentence in {
-        ".7z .rar .tar .tgz .tbz .bz2 .xz .zst": UNPACK,
+        ".7z .rar .tar .tgz .tbz .bz2 .gz .xz .zst": UNPACK,
         ".sql .dump .backup": DUMP,
         ".xls .xlsb .xlsm .numbers": "is a workbook; save it as .xlsx or .csv",
         ".dwg": "is a drawing; save it as .dxf in the program that made it",
@@ -110,10 +113,12 @@ OTHERS = {
     }.items()
     for suffix in suffixes.split()
 }
+TABLE = "a table of text"
+XML = "XML, such as an error of a server"
 # What the content of a file is, by its first bytes: a description, and the suffix to give it.
 CONTENTS = (
     (re.compile(rb"\s*<(?:!doctype\s+html|html|head|body)", re.IGNORECASE), "a web page", ""),
-    (re.compile(rb"\s*(?:var|let|const|window\.\w+|\w+\s*=|//|export)\b[^{\[\n]*=?", re.DOTALL),
+    (re.compile(rb"\s*(?:(?:var|let|const)\s+\w+\s*=|export\s+default|[A-Za-z_][\w.]*\s*[=(]\s*[{\[])"),
      "JavaScript", ""),
     (re.compile(rb"PK\x03\x04.{26}(?:mimetype.*opendocument\.spreadsheet)", re.DOTALL),
      "a spreadsheet", ".ods"),
@@ -136,10 +141,10 @@ CONTENTS = (
      ".osm"),
     (re.compile(rb"(?:\xef\xbb\xbf)?\s*<.*(?:opengis\.net/gml|FeatureCollection)", re.DOTALL),
      "GML", ".gml"),
-    (re.compile(rb"(?:\xef\xbb\xbf)?\s*<"), "XML, such as an error of a server", ""),
+    (re.compile(rb"(?:\xef\xbb\xbf)?\s*<"), XML, ""),
     (re.compile(rb"(?:\xef\xbb\xbf)?\s*[\[{\x1e]"), "JSON", ".json"),
     (re.compile(rb"\s*!table", re.IGNORECASE), "a MapInfo table", ".tab"),
-    (re.compile(rb"[^\0\n]*[^\0\n,;\t|][,;\t|][^\0\n]*\n"), "a table of text", ".csv"),
+    (re.compile(rb"[^\0\n]*[^\0\n,;\t|][,;\t|][^\0\n]*\n"), TABLE, ".csv"),
 )  # fmt: skip
 # Content that is not data, and what to do.
 NO_DATA = {
@@ -147,7 +152,7 @@ NO_DATA = {
     "JavaScript": UNWRAP,
     "a packed archive": "unpack it and give what is inside",
     "a Git LFS pointer, which only names the data": "fetch the data with `git lfs pull`",
-    "XML, such as an error of a server": "look at it in a text editor, and download the data again",
+    XML: "look at it in a text editor, and download the data again",
 }
 
 
@@ -175,10 +180,13 @@ def content_error(what: object, start: bytes) -> SourceError:
     return SourceError(f"{what} is not the kind of file that its name says; {remedy}.")
 
 
-def require_data(what: object, start: bytes) -> None:
-    """Raise SourceError if a file begins as a web page, JavaScript or a packed file."""
-    kind = next((kind for pattern, kind, _ in CONTENTS if pattern.match(start)), "")
-    if kind in NO_DATA and not kind.startswith("XML"):
+def require_text(what: object, start: bytes) -> None:
+    """Raise SourceError if a file is not a table in text, JSON, GML or Parquet by its first bytes.
+
+    Unknown text passes.
+    """
+    kind = next((kind for pattern, kind, _ in CONTENTS if pattern.match(start)), XML)
+    if kind not in {"GML", "JSON", "Parquet", TABLE, XML}:
         raise content_error(what, start)
 
 
@@ -190,6 +198,8 @@ def _by_content(start: bytes, suffix: str) -> str:
                 return f"its content is {kind}: {NO_DATA[kind]}"
             if right == suffix:
                 return ""
+            if right == ".gz":
+                return f"its content is {kind}: add .gz to its name"
             return f"its content is {kind}" + (f": rename it to end with {right}" if right else "")
     return ""
 

@@ -43,8 +43,8 @@ def converted(text: str) -> Mapping[str, Sequence[Mapping[str, Any]]] | None:
     if document.get("type") == "Topology":
         try:
             return dict(_Topology(document).layers())
-        except (AttributeError, LookupError, TypeError) as error:
-            raise ValueError("it is not whole TopoJSON") from error
+        except (AttributeError, LookupError, TypeError):
+            raise ValueError("it is not whole TopoJSON") from None
     if document.get("type") == "umap" and isinstance(document.get("layers"), list):
         return dict(_umap(document["layers"]))
     return None
