@@ -305,6 +305,12 @@ def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
     yield f"files = [{_text(glob.escape(draft.file.name))}]"
     if several:
         yield f"layer = {_text(info.name)}"
+    if info.encoding is not None:
+        doubt = "" if info.encoding.sure else f"{EDIT}: "
+        yield (
+            f"encoding = {_text(info.encoding.encoding)}  # {doubt}the file does not say; look "
+            "whether its texts are right"
+        )
     yield from _identifier(draft)
     if draft.geometry:
         yield f"geometry = {_text(draft.geometry)}"

@@ -24,6 +24,7 @@ from semsig_gis.core import (
     number,
     pairs,
 )
+from semsig_gis.sources.encodings import parse_encoding
 from semsig_gis.sources.filters import COMPARES, Condition, Rules, Value  # noqa: TC001
 
 if TYPE_CHECKING:
@@ -89,6 +90,9 @@ def _crs(code: str) -> str:
     return code
 
 
+_Encoding = Annotated[
+    str, Parsed(parse_encoding), Accepts("the name of an encoding such as 'cp1251' or 'utf-8'")
+]
 _Accepted = Annotated[
     Scalar | Annotated[list[Scalar], length(1)],
     Accepts("the accepted value, or a list of accepted values"),
@@ -185,6 +189,8 @@ class LayerSpec:
         Expected geometry.
     crs : str, optional
         CRS if the file states none, such as ``EPSG:4326``.
+    encoding : str, optional
+        Encoding of the texts of a shapefile or CSV file that does not state it, such as ``cp1251``.
     rows : tuple of (int, int), optional
         Expected minimum and maximum number of rows.
     x_field, y_field : str, optional
@@ -244,6 +250,7 @@ class LayerSpec:
     id_field: str | None = None
     geometry: GeometryKind = "point"
     crs: Annotated[str, Parsed(_crs), Accepts("a known code such as 'EPSG:4326'")] | None = None
+    encoding: _Encoding | None = None
     rows: Annotated[tuple[_Count, _Count], Parsed(_ordered), Accepts("[least, most]")] | None = None
     x_field: str | None = None
     y_field: str | None = None

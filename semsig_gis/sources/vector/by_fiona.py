@@ -52,7 +52,7 @@ for _name in LOGGERS:
 
 def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, tuple[str, ...]]:
     """Return the rows of a layer of `count` rows with errors of bad rows, and notes."""
-    options: dict[str, Any] = {"enabled_drivers": [member.driver], "encoding": member.encoding}
+    options: dict[str, Any] = {"enabled_drivers": [member.driver], "encoding": member.gdal_encoding}
     if member.driver != GEOJSON:  # its driver cannot select fields
         options["include_fields"] = list(fields)
     records: list[logging.LogRecord] = []

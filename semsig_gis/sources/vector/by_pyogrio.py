@@ -122,7 +122,7 @@ def _info(member: Member, *, crs: bool = False) -> dict[str, Any]:
             info: dict[str, Any] = pyogrio.read_info(
                 member.address,
                 layer=member.layer,
-                encoding=member.encoding,
+                encoding=member.gdal_encoding,
                 force_feature_count=True,
                 force_total_bounds=member.driver == GEOJSON,
             )
@@ -239,7 +239,7 @@ def _read(
     Text that is not UTF-8 raises; with a list `undecoded` it becomes None and its field is added to
     the list. A shapefile that does not state its encoding and is not UTF-8 is read as Latin-1.
     """
-    encoding = encoding or member.encoding
+    encoding = encoding or member.gdal_encoding
     options: dict[str, Any] = {"layer": member.layer, "columns": list(fields), "encoding": encoding}
     options |= {"skip_features": start}
     with open_arrow(

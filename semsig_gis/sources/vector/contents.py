@@ -27,6 +27,7 @@ from semsig_gis.sources.compression import (
 )
 from semsig_gis.sources.paths import file_stamp, is_geodatabase, require_file
 from semsig_gis.sources.vector.by_pyogrio import layer_names
+from semsig_gis.sources.vector.dbf import guess_of
 from semsig_gis.sources.vector.formats import (
     ARCHIVES,
     CSV,
@@ -175,8 +176,9 @@ def _prepared(member: Member) -> Iterable[Member]:
         return _from_workbook(member)
     if member.driver == GPX:
         return [_waypoints(member)]
-    if member.driver == SHAPEFILE and member.sibling(".shx") is None:
-        return [_indexed(member)]
+    if member.driver == SHAPEFILE:
+        member = member if member.sibling(".shx") else _indexed(member)
+        return [replace(member, guess=guess_of(member))]
     return [member]
 
 

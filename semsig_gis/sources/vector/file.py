@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.sources.csv_layer import CsvTable
+    from semsig_gis.sources.encodings import Guess
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.positions import PositionFields
@@ -44,12 +45,16 @@ if TYPE_CHECKING:
     from semsig_gis.sources.vector.member import LayerDescription, Member
 
 
+UTF8 = "utf-8"
+
+
 @dataclass(frozen=True, slots=True)
 class LayerInfo:
     """Name, geometry type, CRS, number of rows and fields of a layer of a file.
 
     `geometry` is a term of GDAL, ``"Point"`` for a CSV file with coordinates; `crs` is a code or
-    name.
+    name. `encoding` is a guess for a file that does not state its encoding, and is not ASCII or
+    UTF-8.
     """
 
     name: str
@@ -57,6 +62,7 @@ class LayerInfo:
     crs: str | None
     rows: int
     fields: tuple[str, ...]
+    encoding: Guess | None = None
 
 
 def list_layers(path: str | Path) -> tuple[LayerInfo, ...]:
@@ -113,7 +119,7 @@ def read_layer(
     (1, 2, ("row 2: lon 'here' is not a number",))
     """
     where = f"layer {spec.name!r} ({path})"
-    member = _pick(Path(path), spec.layer)
+    member = replace(_pick(Path(path), spec.layer), encoding=spec.encoding)
     if (csv := _csv(member, spec, where=where)) is not None:
         return read_csv_layer(csv, spec, filters=filters, crs=crs, where=where)
     layer = describe(member)
@@ -229,6 +235,13 @@ def _read_rows(
         for row, position in enumerate(rows.positions):
             if position is None and rows.numbers[row] not in layer.empty:
                 rows.positions[row] = "its geometry is not valid GeoJSON"
+    guess = member.guess if member.encoding is None else None
+    if guess is not None and guess.encoding != UTF8:
+        notes = (
+            f"the encoding is not stated; read as {guess.encoding}"
+            + ("" if guess.sure else ", which is not sure: state the right one as encoding"),
+            *notes,
+        )
     return rows, (*member.notes, *notes)
 
 
@@ -324,4 +337,5 @@ def _describe(member: Member) -> LayerInfo:
         if layer.implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
             crs = None
     label = None if crs is None else crs_label(crs)
-    return LayerInfo(member.name, geometry, label, rows, fields)
+    guess = member.guess if member.guess and member.guess.encoding != UTF8 else None
+    return LayerInfo(member.name, geometry, label, rows, fields, guess)

@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, TYPE_CHECKING
 
 from semsig_gis.core import SourceError
+from semsig_gis.sources.encodings import gdal_name
 from semsig_gis.sources.vector.formats import (
     DRIVERS,
     FIRST_BYTES,
@@ -23,6 +24,8 @@ from semsig_gis.storage import sqlite_fault
 
 if TYPE_CHECKING:
     from pyproj import CRS
+
+    from semsig_gis.sources.encodings import Guess
 
 # Messages of both readers.
 NOT_UTF8 = "some text is not UTF-8 and was read as missing"
@@ -48,8 +51,9 @@ class Copy:
 class Member:
     """A layer of a file, or of the file `inner` of an archive; `layer` None is the first one.
 
-    What GDAL cannot open as it is has a `copy` that it can open. `encoding` is that of the texts,
-    if the file does not state it; `label` is the name of the layer where its own is not unique.
+    What GDAL cannot open as it is has a `copy` that it can open. `encoding` is that of the texts
+    according to the catalogue, `guess` a guess of one that the file does not state. `label` is the
+    name of the layer where its own is not unique, and `notes` are for the user.
     """
 
     file: Path
@@ -57,6 +61,7 @@ class Member:
     layer: str | None = None
     copy: Copy | None = field(default=None, compare=False)
     encoding: str | None = None
+    guess: Guess | None = None
     label: str = ""
     notes: tuple[str, ...] = ()
 
@@ -88,6 +93,12 @@ class Member:
             return f"/vsicached?file={escaped}" if {"!", ";"} & {*file} else file
         # GDAL's own form, because zip:// is parsed as a URL and cut at a '#' or a '?'.
         return f"/vsizip/{{{self.file.resolve().as_posix()}}}/{self.inner}"
+
+    @property
+    def gdal_encoding(self) -> str | None:
+        """GDAL's name of the encoding of the texts, or None if the file states it."""
+        encoding = self.encoding or (self.guess and self.guess.encoding)
+        return gdal_name(encoding) if encoding else None
 
     def __str__(self) -> str:
         """Return the name for messages."""
