@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import operator
 import unicodedata
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +15,9 @@ ENCODINGS = ("cp1252", "cp1250", "cp1251", "cp1253", "cp1254", "cp1255", "cp1256
              "iso8859_2", "iso8859_5", "iso8859_7", "koi8_r", "mac_roman", "cp437", "cp850",
              "cp866", "cp932", "euc_jp", "gb18030", "big5", "cp949")  # fmt: skip
 MOST_WORDS = 2_000
-# A guess is sure if few words are implausible, and clearly more in any other encoding.
+# A guess is sure if few words are implausible, and clearly more, as a share or a number, in any
+# other encoding that does not give the same words.
+LEAST_WORDS, SAME_SHARE = 1.9, 0.95
 MOST_IMPLAUSIBLE, LEAST_DISTANCE, LEAST_LETTERS = 0.2, 0.2, 8
 # Letters of languages beyond a to z.
 ALPHABETS = tuple(map(frozenset, (
@@ -77,14 +80,18 @@ def guess_encoding(words: Iterable[bytes]) -> Guess | None:
     if not scores:
         return None
     score, _, encoding, texts = min(scores)
-    others = (other[0] for other in scores if other[3] != texts)
-    letters = sum(not letter.isascii() for text in texts for letter in text)
-    return Guess(
-        encoding,
-        score <= MOST_IMPLAUSIBLE
-        and min(others, default=1.0) >= score + LEAST_DISTANCE
-        and letters >= LEAST_LETTERS,
+    # The least distance of an encoding in which more than a few words are others.
+    distance = min(
+        (
+            other - score
+            for other, *_, others in scores
+            if SAME_SHARE * len(texts) > sum(map(operator.eq, texts, others))
+        ),
+        default=1.0,
     )
+    enough = distance >= LEAST_DISTANCE or distance * len(texts) >= LEAST_WORDS
+    letters = sum(len(_foreign(text)) for text in texts)
+    return Guess(encoding, score <= MOST_IMPLAUSIBLE and enough and letters >= LEAST_LETTERS)
 
 
 def is_utf8(words: Iterable[bytes]) -> bool:

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 # Other files (.dbf, .prj, a README) only accompany data.
 FILE_SUFFIXES = frozenset(
     {".bz2", ".csv", ".fgb", ".geojson", ".geoparquet", ".gml", ".gpkg", ".gz", ".json",
-     ".osm", ".parquet", ".pbf", ".shp", ".zip",
+     ".osm", ".parquet", ".pbf", ".shp", ".umap", ".xlsx", ".zip",
      ".dxf", ".gdb", ".geojsonl", ".geojsons", ".geojsonseq", ".gpx", ".jsonl", ".kml", ".kmz",
-     ".mif", ".ndjson", ".o5m", ".ods", ".osh", ".sqlite", ".tab",
-     ".topojson", ".tsv", ".umap", ".xlsx"}
+     ".mif", ".ndjson", ".o5m", ".ods", ".osh", ".spatialite", ".sqlite", ".sqlite3", ".tab",
+     ".topojson", ".tsv"}
 )  # fmt: skip
 # A shapefile consists of several files, and each may be replaced.
 SHAPEFILE_PARTS = (".shp", ".shx", ".dbf", ".prj", ".cpg")

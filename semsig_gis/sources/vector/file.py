@@ -16,6 +16,7 @@ import numpy as np
 
 from semsig_gis.core import SourceError, UnknownNameError, crs_label, nearest_name
 from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
+from semsig_gis.sources.encodings import Guess
 from semsig_gis.sources.positions import (
     SAMPLE_ROWS,
     PlaceReader,
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.sources.csv_layer import CsvTable
-    from semsig_gis.sources.encodings import Guess
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.positions import PositionFields
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 
 
 UTF8 = "utf-8"
+# Guesses that need no note: most programs read these encodings if none is stated.
+EXPECTED = (Guess(UTF8, sure=True), Guess("cp1252", sure=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +238,7 @@ def _read_rows(
             if position is None and rows.numbers[row] not in layer.empty:
                 rows.positions[row] = "its geometry is not valid GeoJSON"
     guess = member.guess if member.encoding is None else None
-    if guess is not None and guess.encoding != UTF8:
+    if guess is not None and guess not in EXPECTED:
         notes = (
             f"the encoding is not stated; read as {guess.encoding}"
             + ("" if guess.sure else ", which is not sure: state the right one as encoding"),
