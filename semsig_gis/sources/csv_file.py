@@ -8,7 +8,6 @@ import csv
 import io
 import itertools
 import re
-import unicodedata
 from collections import Counter
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
@@ -16,6 +15,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple
 from charset_normalizer import from_bytes
 
 from semsig_gis.core import SourceError
+from semsig_gis.sources.encodings import Guess, guess_encoding
 from semsig_gis.sources.position_values import WELL_KNOWN
 
 if TYPE_CHECKING:
@@ -42,13 +42,8 @@ MARKS = {
     codecs.BOM_UTF16_LE: "utf-16",
     codecs.BOM_UTF16_BE: "utf-16",
 }
-# Encodings of tables, the most frequent first; the first of equally good ones is chosen.
-ENCODINGS = ("cp1252", "cp1250", "cp1251", "cp1253", "cp1254", "cp1255", "cp1256", "cp1257",
-             "iso8859_2", "iso8859_5", "iso8859_7", "koi8_r", "mac_roman", "cp437", "cp850",
-             "cp866", "cp932", "euc_jp", "gb18030", "big5", "cp949")  # fmt: skip
 WIDE_ENCODINGS = ("utf_16_le", "utf_16_be", "utf_32_le", "utf_32_be")
 SAMPLE_WORDS = 5_000
-SYMBOLS = frozenset({"No", "Sc", "Sk", "Sm", "So"})
 NO_WORDS = re.compile(rb'[\s;,"0-9]+')
 DAMAGED = "\N{REPLACEMENT CHARACTER}"
 
@@ -59,7 +54,8 @@ class CsvFile:
 
     `what` is its name in messages, `errors` the error handler for bytes that are not text, `notes`
     are remarks for the user. `layouts` has the stripped column names by separator, the best first,
-    and `starts` the number of lines before them.
+    and `starts` the number of lines before them. `guess` is the encoding if nothing states it, and
+    the file is not in UTF-8.
     """
 
     open: Callable[[], IO[bytes]]
@@ -69,6 +65,7 @@ class CsvFile:
     layouts: Mapping[str, tuple[str, ...]]
     starts: Mapping[str, int]
     notes: tuple[str, ...] = ()
+    guess: Guess | None = None
 
     @property
     def separator(self) -> str:
@@ -119,17 +116,21 @@ class CsvFile:
             csv.field_size_limit(before)
 
 
-def open_csv(open_: Callable[[], IO[bytes]], what: str) -> CsvFile:
+def open_csv(open_: Callable[[], IO[bytes]], what: str, *, encoding: str | None = None) -> CsvFile:
     """Detect encoding and separators of a CSV file.
 
-    Without a byte order mark the encoding is UTF-8 if the text is valid, else the guess of
-    charset-normalizer. SourceError if the file is empty, not text, has no header, or its encoding
-    is unknown.
+    Without a stated `encoding` or a byte order mark the encoding is UTF-8 if the text is valid,
+    else a guess. SourceError if the file is empty, not text, has no header, or its encoding is
+    unknown.
     """
-    encoding, errors, notes = _encoding(open_, what)
+    guess = None
+    if encoding is not None:
+        errors, notes = "replace", tuple[str, ...]()
+    else:
+        encoding, errors, notes, guess = _encoding(open_, what)
     layouts: dict[str, tuple[str, ...]] = {}
     starts: dict[str, int] = {}
-    file = CsvFile(open_, what, encoding, errors, layouts, starts, notes)
+    file = CsvFile(open_, what, encoding, errors, layouts, starts, notes, guess)
     try:
         with file.text() as stream:
             lines = [*itertools.islice(stream, FIRST_LINES)]
@@ -241,13 +242,15 @@ def _parsed(lines: Iterable[str], separator: str) -> Any:  # noqa: ANN401 - a ty
     return csv.reader(lines, delimiter=separator, strict=True)
 
 
-def _encoding(open_: Callable[[], IO[bytes]], what: str) -> tuple[str, str, tuple[str, ...]]:
-    """Return the encoding of a file, the handler of decoding errors, and notes."""
+def _encoding(
+    open_: Callable[[], IO[bytes]], what: str
+) -> tuple[str, str, tuple[str, ...], Guess | None]:
+    """Return the encoding of a file, the handler of decoding errors, notes and a guess."""
     with open_() as stream:
         head = stream.read(READ_BYTES)
         marked = (name for mark, name in MARKS.items() if head.startswith(mark))
         if (encoding := next(marked, None)) and encoding != "utf-8-sig":
-            return encoding, "strict", ()
+            return encoding, "strict", (), None
         decoder = codecs.getincrementaldecoder("utf-8-sig")("replace")
         # `wide` counts null bytes, of UTF-16 or UTF-32; `good` and `bad` count characters that are
         # not ASCII and valid in UTF-8, or not valid.
@@ -266,34 +269,30 @@ def _encoding(open_: Callable[[], IO[bytes]], what: str) -> tuple[str, str, tupl
     bad += decoder.decode(b"", final=True).count(DAMAGED)
     if encoding or (not wide and (good > bad or not bad)):
         note = f"{bad:,} places are not UTF-8 and are read as {DAMAGED}"
-        return "utf-8-sig", *(("replace", (note,)) if bad else ("strict", ()))
-    # Guess from the words that are not ASCII, because the others are the same in any encoding.
-    sample = head if wide else b" ".join(words)
-    candidates = WIDE_ENCODINGS if wide else ENCODINGS
-    matches = from_bytes(sample[: 2**16], cp_isolation=list(candidates), enable_fallback=False)
+        return "utf-8-sig", *(("replace", (note,)) if bad else ("strict", ())), None
+    guess = Guess(_wide_encoding(head), sure=True) if wide else guess_encoding(words)
+    if guess is None or not guess.encoding:
+        raise _unknown_encoding(what)
+    doubt = "" if guess.sure else ", which is not sure: state the right one as encoding"
+    note = f"the file is not in UTF-8; it is read as {guess.encoding}{doubt}"
+    return guess.encoding, "strict", (note,), guess
+
+
+def _wide_encoding(head: bytes) -> str:
+    """Return the encoding of two or four bytes for a character, or an empty text."""
+    matches = from_bytes(head[: 2**16], cp_isolation=list(WIDE_ENCODINGS), enable_fallback=False)
     # A match may list several encodings in which the sample is the same text.
     ranked = [
-        (match.chaos + _symbol_share(str(match)), -match.coherence, number, name)
+        (match.chaos, -match.coherence, number, name)
         for match in matches
-        for number, name in enumerate(candidates)
+        for number, name in enumerate(WIDE_ENCODINGS)
         if name in match.could_be_from_charset
     ]
-    *_, best = min(ranked, default=(None,))
-    text = "\0" if wide else ""
-    if wide and best is not None:
-        with contextlib.suppress(UnicodeDecodeError):
-            text = codecs.getincrementaldecoder(best)().decode(head)
-    if best is None or "\0" in text:
-        raise _unknown_encoding(what)
-    return best, "strict", (f"the file is not in UTF-8; it is read as {best}",)
-
-
-def _symbol_share(text: str) -> float:
-    """Return the share of symbols in the characters that are not ASCII."""
-    # Words consist of letters, so that symbols show a wrong encoding.
-    foreign = [letter for letter in text if not letter.isascii()]
-    symbols = sum(unicodedata.category(letter) in SYMBOLS or letter in "¿¡" for letter in foreign)
-    return symbols / max(len(foreign), 1)
+    *_, best = min(ranked, default=("",))
+    with contextlib.suppress(UnicodeDecodeError):
+        if best and "\0" not in codecs.getincrementaldecoder(best)().decode(head):
+            return best
+    return ""
 
 
 def _unknown_encoding(what: str) -> SourceError:

@@ -75,7 +75,7 @@ def csv_table(
 
     SourceError if `spec` is given and there are none.
     """
-    file = open_csv(open_, what)
+    file = open_csv(open_, what, encoding=spec.encoding if spec else None)
     if spec is not None:
         stated = (spec.x_field, spec.y_field, spec.geometry_field)
         own = {name for name in stated if name}

@@ -190,7 +190,8 @@ class LayerSpec:
     crs : str, optional
         CRS if the file states none, such as ``EPSG:4326``.
     encoding : str, optional
-        Encoding of the texts of a shapefile or CSV file that does not state it, such as ``cp1251``.
+        Encoding of the texts of a shapefile or CSV file, such as ``cp1251``, if it states none or
+        a wrong one.
     rows : tuple of (int, int), optional
         Expected minimum and maximum number of rows.
     x_field, y_field : str, optional

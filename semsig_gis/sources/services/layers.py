@@ -220,7 +220,9 @@ def read_layers(
     path = Path(path)
     if path.suffix.lower() in VECTOR_SUFFIXES:
         return tuple(_read_vector(path, spec, filters=filters, crs=crs) for spec in specs)
-    return _read_table(open_table(path), specs, path, filters=filters, crs=crs)
+    encoding = next((spec.encoding for spec in specs if spec.encoding), None)
+    table = open_table(path, encoding=encoding)
+    return _read_table(table, specs, path, filters=filters, crs=crs)
 
 
 def _read_table(

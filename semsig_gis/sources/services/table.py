@@ -92,8 +92,11 @@ class ServiceTable:
     notes: tuple[str, ...] = ()
 
 
-def open_table(path: Path) -> ServiceTable:
-    """Open a file by its content, not its name; SourceError if it cannot be used."""
+def open_table(path: Path, *, encoding: str | None = None) -> ServiceTable:
+    """Open a file by its content, not its name; SourceError if it cannot be used.
+
+    `encoding` is that of a CSV file, if it is stated.
+    """
     require_file(path, "a file that a service sends")
     with path.open("rb") as stream:
         start = stream.read(4096).removeprefix(b"\xef\xbb\xbf").lstrip()
@@ -104,7 +107,7 @@ def open_table(path: Path) -> ServiceTable:
         return _json(path)
     if start.startswith(b"<"):
         return _gml(path)
-    file = open_csv(lambda: path.open("rb"), str(path))
+    file = open_csv(lambda: path.open("rb"), str(path), encoding=encoding)
     separator = file.separator
 
     def records(_: Sequence[str]) -> Records:

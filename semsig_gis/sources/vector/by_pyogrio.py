@@ -16,6 +16,7 @@ import pyarrow.compute as pc
 import pyogrio
 import shapely
 from pyogrio.raw import open_arrow, read
+from shapely.geometry.base import BaseGeometry
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
@@ -25,6 +26,7 @@ from semsig_gis.sources.vector.geojson import parse_geojson
 from semsig_gis.sources.vector.member import (
     NOT_UTF8,
     OUT_OF_REACH,
+    UNKNOWN,
     LayerDescription,
     unreadable,
 )
@@ -84,7 +86,8 @@ def _captured_warnings(*, crs: bool = False) -> Iterator[list[warnings.WarningMe
 def describe(member: Member, *, bounds: bool = False) -> LayerDescription:
     """Describe a layer of a file; SourceError if it cannot be opened, or is of another kind.
 
-    For the `bounds` of GeoJSON, GDAL parses the file as well.
+    For the `bounds` of GeoJSON, GDAL parses the file as well. With them, the geometries of a layer
+    without a type are read to find it.
     """
     member.require_sound()
     if member.driver == GEOJSON:
@@ -101,8 +104,11 @@ def describe(member: Member, *, bounds: bool = False) -> LayerDescription:
         if text not in _matches:
             _matches[text] = _info(member, crs=True)["crs"] or ""
         text = _matches[text]
+    geometry = info["geometry_type"] or NO_GEOMETRY
+    if bounds and geometry == UNKNOWN and member.driver != GEOJSON:
+        geometry = _common_type(member, info["features"])
     layer = LayerDescription(
-        geometry=info["geometry_type"] or NO_GEOMETRY,
+        geometry=geometry,
         fields=tuple(info["fields"]),
         crs=usable_crs(text),
         rows=info["features"],
@@ -129,6 +135,14 @@ def _info(member: Member, *, crs: bool = False) -> dict[str, Any]:
     except Exception as error:
         raise unreadable(member, error) from error
     return info
+
+
+def _common_type(member: Member, count: int) -> str:
+    """Return the geometry type of all rows of a layer that does not state one."""
+    rows = read_whole(member, (), count)
+    places = rows.positions if rows else []
+    kinds = {place.geom_type for place in places if isinstance(place, BaseGeometry)}
+    return kinds.pop() if len(kinds) == 1 else UNKNOWN
 
 
 def layer_names(member: Member) -> list[str]:

@@ -25,6 +25,7 @@ from semsig_gis.sources.compression import (
     decompression_bomb_error,
     ratio_too_high,
 )
+from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.paths import file_stamp, is_geodatabase, require_file
 from semsig_gis.sources.vector.by_pyogrio import layer_names
 from semsig_gis.sources.vector.dbf import guess_of
@@ -264,14 +265,15 @@ def _write_csv(path: Path, rows: Iterable[Iterable[object]]) -> None:
         csv.writer(stream, delimiter="\t").writerows(rows)
 
 
-def _from_workbook(member: Member) -> Iterator[Member]:
-    """Yield the sheets of a workbook that have rows, as tables of text."""
+def _from_workbook(member: Member) -> list[Member]:
+    """Return the sheets of a workbook that have rows, as tables of text."""
     if member.inner is not None:
         copy = Copy(member.path.name)
         with member.open() as source, copy.path.open("wb") as target:
             shutil.copyfileobj(source, target)
         member = replace(member, copy=copy)
     _names(Path(member.path), member)
+    sheets = []
     for name in layer_names(member):
         columns = read(
             member.address, layer=name, read_geometry=False, HEADERS="DISABLE", FIELD_TYPES="STRING"
@@ -281,7 +283,18 @@ def _from_workbook(member: Member) -> Iterator[Member]:
         if len(filled) > 1:
             table = Copy(f"{member.path.stem}.csv")
             _write_csv(table.path, filled)
-            yield replace(member, layer=name, copy=table)
+            sheets.append(replace(member, layer=name, copy=table))
+    if not sheets:
+        raise SourceError(f"{member} has no sheet with rows; give a table with a row of names.")
+    # A sheet of remarks, or without a header, is left out beside others.
+    return [sheet for sheet in sheets if _is_table(sheet)] or sheets
+
+
+def _is_table(sheet: Member) -> bool:
+    try:
+        return len(open_csv(sheet.open, str(sheet)).layouts["\t"]) > 1
+    except (KeyError, SourceError):
+        return False
 
 
 def _indexed(member: Member) -> Member:

@@ -331,6 +331,7 @@ def _describe(member: Member) -> LayerInfo:
     if table is not None:
         rows, geometry = table.survey()
         crs, fields = table.places.crs if table.places else None, table.names
+        guess = table.file.guess
     else:
         layer = describe(member, bounds=True)
         rows, geometry, crs, fields = layer.rows, layer.geometry, layer.crs, layer.fields
@@ -338,6 +339,6 @@ def _describe(member: Member) -> LayerInfo:
             geometry, crs = NO_GEOMETRY, None if layer.implicit else crs  # all null or not valid
         if layer.implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
             crs = None
+        guess = None if member.guess and member.guess.encoding == UTF8 else member.guess
     label = None if crs is None else crs_label(crs)
-    guess = member.guess if member.guess and member.guess.encoding != UTF8 else None
     return LayerInfo(member.name, geometry, label, rows, fields, guess)
