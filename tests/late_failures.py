@@ -23,14 +23,14 @@ MOST_CALLS = 400
 
 
 def failures(
-    patch: pytest.MonkeyPatch, *, exchange: bool, calls: int = 1
+    patch: pytest.MonkeyPatch, *, exchange: bool, calls: int = 1, every: int = 1
 ) -> Iterator[Callable[[Callable[[], Any]], InputError | None]]:
     """Yield functions that run a block while some of its system calls from the n-th on fail.
 
-    n goes from the first call to the last, and `calls` fail. Each function returns the error of the
+    n goes from the first call to the last in steps of `every`, and `calls` fail. Each function returns the error of the
     block, if it is an `InputError`. The last block runs without a failure.
     """
-    for number in range(MOST_CALLS):
+    for number in range(0, MOST_CALLS, every):
         system = _FailingSystem(number, calls)
 
         def run(block: Callable[[], Any], system: _FailingSystem = system) -> InputError | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from dataclasses import replace
 from functools import cached_property
@@ -12,7 +13,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core import DatabaseError, Displayed, InputError, export_with, map_with
+from semsig_gis.core import (
+    DatabaseError,
+    Displayed,
+    InputError,
+    export_with,
+    map_with,
+    place_locked,
+)
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.database.file import (
     INPUTS,
@@ -281,10 +289,16 @@ class City(Displayed):
         replaced as a whole. DatabaseError if the database has other cells.
         """
         added = {name: {"columns": columns.column_names, "facts": facts}}
-        if not self.path.is_dir():
+        with place_locked(Path(os.path.realpath(self.path))):
             self._read(file_state)
-            _write_with_columns(self.path, self.path, columns, cell_ids, added)
+            self._write_columns(columns, cell_ids, added)
             self._read_state = None
+
+    def _write_columns(
+        self, columns: pa.Table, cell_ids: NDArray[np.int64], added: dict[str, Any]
+    ) -> None:
+        if not self.path.is_dir():
+            _write_with_columns(self.path, self.path, columns, cell_ids, added)
             return
         files, manifest = self.files, read_manifest(self.path)
         with whole_folder(self.path) as partial:

@@ -6,6 +6,7 @@ are finished, the folder is renamed to ``OUT``.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 from collections import Counter
@@ -32,6 +33,7 @@ from semsig_gis.core import (
     check_workers,
     consecutive,
     finish_tasks,
+    place_locked,
     require_number,
     require_step,
     split_ids,
@@ -212,7 +214,10 @@ def build_tiles(
     True
     """
     check_workers(workers, scheduler)
-    with input_files(objects, out, buildings=buildings, streets=streets) as surroundings:
+    with (
+        place_locked(Path(os.path.realpath(out))),
+        input_files(objects, out, buildings=buildings, streets=streets) as surroundings,
+    ):
         plan = plan_tiles(
             objects,
             out,
@@ -590,5 +595,6 @@ def publish_tiles(folder: Path, parts: Sequence[PartFile]) -> Manifest:
     manifest.write(folder)
     names = {MANIFEST, RECIPE, INPUTS, *(part.file for part in manifest.parts)}
     target = finish(folder, keep=names)
-    (target / RECIPE).unlink()
+    with contextlib.suppress(OSError):  # the database is in place, and the next run removes it
+        (target / RECIPE).unlink()
     return manifest

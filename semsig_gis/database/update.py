@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections import Counter
 from dataclasses import asdict, dataclass, replace
@@ -25,6 +26,7 @@ from semsig_gis.core import (
     cells_near,
     check_workers,
     percent,
+    place_locked,
     split_ids,
 )
 from semsig_gis.database.cells import build_cells, cell_reach
@@ -206,9 +208,12 @@ def update_file(
     >>> sum(item.removed for item in report.classes), 0 < report.share < 0.5
     (1, True)
     """
-    city = open_city(path)
-    database, store, report = update_database(city.database, city.store, objects, progress=progress)
-    save_with_store(database, store, path if out is None else out)
+    target = path if out is None else out
+    with place_locked(Path(os.path.realpath(target))):
+        city = open_city(path)
+        updated = update_database(city.database, city.store, objects, progress=progress)
+        database, store, report = updated
+        save_with_store(database, store, target)
     return report
 
 
@@ -354,7 +359,17 @@ def update_tiles(
     (1, True)
     """
     check_workers(workers, scheduler)
-    folder, manifest = Path(path), read_manifest(path)
+    target = Path(path if out is None else out)
+    with place_locked(Path(os.path.realpath(target))):
+        run = partial(build_parts, workers=workers, scheduler=scheduler, progress=progress)
+        return _update_tiles(Path(path), objects, target, run)
+
+
+def _update_tiles(
+    folder: Path, objects: str | Path, target: Path, run: Callable[..., list[PartFile]]
+) -> UpdateReport:
+    """Update a database in tiles; `run` is `build_parts` with its options."""
+    path, manifest = folder, read_manifest(folder)
     files = dict(zip((part.tile for part in manifest.parts), part_files(path), strict=True))
     before = open_database(next(iter(files.values()))).select(slice(0))
     inputs = stored_inputs(folder)
@@ -379,7 +394,6 @@ def update_tiles(
     side = int(manifest.recipe["tile"]["cells"])
     tiles = np.unique(np.stack(split_ids(change.cell_ids), axis=1) // side, axis=0)
     stale: set[Tile] = {(column, row) for column, row in tiles.tolist()}
-    target = Path(path if out is None else out)
     with working_folder(target) as work:
         source = Path(objects)
         if other_layers:
@@ -404,15 +418,12 @@ def update_tiles(
             shutil.copyfile(files[tile], plan.folder / part.file)
         old_tiles = _OldTiles(folder, plan.folder / INPUTS / "stale.npy", facts)
         np.save(old_tiles.stale, change.cell_ids)
-        parts = build_parts(
+        parts = run(
             plan,
             source,
             build=partial(update_tile, plan, old_tiles),
             copies=copies,
             share=len(change.cell_ids) / manifest.cells,
-            workers=workers,
-            scheduler=scheduler,
-            progress=progress,
             remark=None,
         )
         drift = _total_drift(plan, old_tiles, stale)

@@ -556,7 +556,7 @@ def test_database_and_store_are_old_or_new_as_the_message_says(
         assert len(open_database(path)) == len(build_database(new if count == len(new) else TOWN))
         return "new" if count == len(new) else "old"
 
-    for run in failures(monkeypatch, exchange=True, calls=calls):
+    for run in failures(monkeypatch, exchange=True, calls=calls, every=min(calls, 4)):
         save(path, TOWN)
         assert_true(run(lambda: save_with_store(*saved, path)), tmp_path, state, names=names)
     assert state() == "new"

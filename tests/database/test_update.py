@@ -4,6 +4,7 @@ import dataclasses
 import json
 import shutil
 import tempfile
+import threading
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,7 +44,14 @@ from semsig_gis.database import (
     update_tile,
     update_tiles,
 )
-from semsig_gis.objects import Licence, assemble, choose_layers, read_files, save_objects
+from semsig_gis.objects import (
+    Licence,
+    assemble,
+    choose_layers,
+    open_objects,
+    read_files,
+    save_objects,
+)
 from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
@@ -417,6 +425,39 @@ def test_an_interrupted_update_of_tiles_is_resumed(
     check_report(update_tiles(tiled, new), before, open_database(tiled))
     build_tiles(new, tmp_path / "rebuilt", tile=TileSpec(100.0))
     assert folder_bytes(tiled) == folder_bytes(tmp_path / "rebuilt")
+
+
+@pytest.mark.parametrize("tiles", [True, False])
+def test_updates_at_the_same_time_follow_each_other(
+    *, tiles: bool, path: Path, tiled: Path, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    """Each replaces another layer; none is lost, and none fails."""
+    names = sorted(table["source"].unique())[:2]
+    files, counts = [], {}
+    for number, name in enumerate(names):
+        layer = table[table["source"] == name]
+        rows = layer.iloc[: len(layer) // (number + 2)]
+        counts[name] = len(rows)
+        files.append(tmp_path / f"{number}.parquet")
+        save_objects(objects_of(rows), files[-1])
+    place, errors = tiled if tiles else path, list[Exception]()
+
+    def update(file: Path) -> None:
+        try:
+            update_tiles(place, file) if tiles else update_file(place, open_objects(file))
+        except Exception as error:  # noqa: BLE001 - of another thread
+            errors.append(error)
+
+    threads = [threading.Thread(target=update, args=(file,)) for file in files]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert errors == []
+    objects = open_store(place).objects
+    assert {name: int((objects.table["source"] == name).sum()) for name in names} == counts
+    assert len(open_database(place)) == len(build_database(objects))
+    assert not [*place.parent.glob(".semsig-*")]
 
 
 def test_tiles_keep_their_inputs_as_a_store(
