@@ -108,6 +108,7 @@ FORMATS = {
 }
 MARKS_TO_PREPARE = 5
 QUICKLY_EXPLAINED = 3  # candidates of a quick answer
+MOST_NAME = 40  # letters of a name in a message
 PANORAMA_RATIO = 2  # width / height of a full panorama
 
 
@@ -291,9 +292,16 @@ class Workbench:
         # The readers of detections expect files, with the labels of YOLO next to the boxes.
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, name)
-            file.write_text(request.text or "", encoding="utf-8")
-            if request.classes:
-                Path(folder, "classes.txt").write_text(request.classes, encoding="utf-8")
+            try:
+                file.write_text(request.text or "", encoding="utf-8")
+                if request.classes:
+                    Path(folder, "classes.txt").write_text(request.classes, encoding="utf-8")
+            except (OSError, ValueError) as error:  # of a name such as "..", or half a character
+                reason = getattr(error, "strerror", None) or "it is not Unicode"
+                raise InputError(
+                    f"the file {name[:MOST_NAME]!r} cannot be read ({reason}); give it a plain "
+                    "name, and text in UTF-8."
+                ) from error
             try:
                 pictures, _ = read_pictures([file])
             except SemsigError as error:

@@ -420,6 +420,14 @@ def test_detector_boxes_become_marks(page: Page) -> None:
         ({"labels": ["nowhere"]}, "nowhere"),
         ({"photos": [{**SIDE, "name": "z.jpg", "fov": FOV}]}, "a.jpg"),
         ({"photos": [{}]}, "width"),
+        ({"photos": "a.jpg"}, "photos"),
+        ({"labels": [{}]}, "label 1 is {}"),
+        ({"name": ".."}, "cannot be read"),
+        ({"name": "a\0b.json"}, "give it a plain name"),
+        ({"name": "x" * 300}, "cannot be read (File name too long)"),
+        ({"name": "\ud800.json"}, "cannot be read"),
+        ({"text": "\ud800"}, "text in UTF-8"),
+        ({"classes": "\ud800"}, "text in UTF-8"),
     ):
         page.refused("/api/boxes", body | change, word)
 

@@ -632,7 +632,7 @@ def test_invalid_photo_or_session_shows_a_notice(workbench: WorkbenchPage) -> No
     session = workbench.ask("return semsig.session.saved()")
     changes: list[tuple[dict[str, Any], str]] = [
         ({"version": 2}, "not a session"),
-        ({"views": [{"photos": [{}]}]}, "not a session"),
+        ({"views": [{"photos": [{}]}]}, "The views of this session are not as"),
         ({"city": {"name": "elsewhere", "fingerprint": "0"}}, "elsewhere"),
     ]
     texts = [("{", "not a session")]
@@ -641,6 +641,66 @@ def test_invalid_photo_or_session_shows_a_notice(workbench: WorkbenchPage) -> No
         workbench.give_new("#open", f"session{number}.json", text)
         assert word in workbench.notice()
         workbench.press("#notice button")
+
+
+# Puts each of some values at each place of a session, and opens it.
+EDIT = """
+const [saved] = arguments;
+const values = [null, -1, 1e308, "x", true, [], {}, [null], [[{}]]];
+const places = [];
+const walk = (value, place) => {
+  places.push(place);
+  if (value instanceof Object) for (const key in value) walk(value[key], [...place, key]);
+};
+walk(saved, []);
+const answers = new Set();
+for (const place of places) {
+  for (const value of values) {
+    const copy = {all: structuredClone(saved)};
+    const way = ["all", ...place];
+    let part = copy;
+    for (const key of way.slice(0, -1)) part = part[key];
+    part[way.at(-1)] = value;
+    try {
+      semsig.session.restore(copy.all);
+      answers.add("restored");
+    } catch (error) {
+      answers.add(error.message);
+    }
+  }
+}
+semsig.session.restore(saved);
+return [places.length, [...answers]];
+"""
+
+
+def test_session_edited_by_hand_is_refused_or_shown(workbench: WorkbenchPage) -> None:
+    mark = {"class": "bench", "range": "near", "text": "12a"}
+    photo: dict[str, Any] = {
+        "name": "a.jpg",
+        "width": 400,
+        "height": 300,
+        "projection": "pinhole",
+        "fov": 60,
+    }
+    photo |= {"heading": 10, "heading_error": 5, "place": [48.5, 3.0]}
+    photo["marks"] = [mark | {"x": 10, "y": 20}, mark | {"box": [1, 2, 30, 40]}]
+    compass = [mark | {"bearing": 5.0, "range": 12}]
+    views: list[dict[str, Any]] = [
+        {"photos": [photo], "step": None},
+        {"compass": compass, "sectors": [[315, 45]], "heading_error": "unknown"},
+    ]
+    views[1]["step"] = {"bearing": 9.0, "metres": 1.0}
+    session = workbench.ask("return semsig.session.saved()")
+    session |= {"views": views, "near": [48.5, 3.0, 20], "absent": ["bench"], "truth": [48.5, 3.0]}
+    session["answer"] = None
+    places, answers = workbench.ask(EDIT, session)
+    assert places > 60
+    texts = {answer.split(" of this session")[0] for answer in answers if answer != "restored"}
+    names = {f"The {name}" for name in ("views", "truth", "near", "seen_from", "absent", "noise")}
+    assert {text for text in texts if not text.startswith("This ")} == names
+    assert all(answer.endswith((".", "restored")) for answer in answers)
+    assert len(workbench.all(".tab")) == 2
 
 
 def test_detector_boxes_become_marks(workbench: WorkbenchPage, photos: list[StreetPhoto]) -> None:

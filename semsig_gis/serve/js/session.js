@@ -18,6 +18,38 @@ semsig.api = async (path, body, signal) => {
   throw Object.assign(new Error(error || `The server answered with status ${response.status}.`),
     {status: response.status});
 };
+// What is in the file of a session: functions that say whether a value is as the page saves it.
+semsig.sessionParts = (() => {
+  const within = (low, high) => (value) => Number.isFinite(value) && value >= low && value <= high;
+  const maybe = (check) => (value) => (value ?? null) === null || check(value);
+  const among = (...values) => (value) => values.includes(value);
+  const text = (value) => typeof value === "string";
+  const list = (check) => (value) => Array.isArray(value) && value.every(check);
+  const row = (...checks) => (value) => Array.isArray(value) && value.length === checks.length
+    && checks.every((check, at) => check(value[at]));
+  const table = (checks) => (value) => value instanceof Object
+    && Object.entries(checks).every(([key, check]) => check(value[key]));
+  const degrees = within(-360, 360);
+  const metres = within(-1e6, 1e6);
+  const pixel = within(-1e6, 1e6);
+  const side = within(1, 1e6);
+  const [lat, lon] = [within(-90, 90), degrees];
+  const seen = {class: text, text: maybe(text),
+    range: maybe((value) => metres(value) || among("near", "middle", "far")(value))};
+  const error = maybe((value) => value === "unknown" || degrees(value));
+  const mark = (value) => table(seen)(value) && (value.box
+    ? row(pixel, pixel, pixel, pixel)(value.box) : pixel(value.x) && pixel(value.y));
+  const photo = table({marks: list(mark), width: side, height: side, name: maybe(text),
+    fov: maybe(degrees), heading: maybe(degrees), heading_error: error, place: maybe(row(lat, lon)),
+    projection: among("pinhole", "equirectangular", "cylindrical", "fisheye")});
+  const step = maybe(table({bearing: degrees, metres}));
+  const compass = table({step, heading_error: error, compass: list(table({...seen, bearing: degrees})),
+    sectors: maybe(list(row(within(-360, 720), within(-360, 720))))});
+  const photos = table({step, photos: (value) => list(photo)(value) && value.length > 0});
+  const view = (value) => (value?.photos ? photos : compass)(value);
+  return {views: list(view), truth: maybe(row(lat, lon)), near: maybe(row(lat, lon, within(0, 1e6))),
+    noise: maybe(text), seen_from: among("anywhere", "cells"), absent: maybe(list(text))};
+})();
 semsig.Session = class extends EventTarget {
   constructor(city) {
     super();
@@ -170,11 +202,13 @@ semsig.Session = class extends EventTarget {
   }
   // Restores a session from a file, which does not contain the photos.
   restore(saved) {
-    const whole = (view) => (view?.photos || [view]).every(
-      (scene) => Array.isArray(scene?.marks || scene?.compass));
-    if (saved?.semsig !== "session" || saved.version !== 1
-      || !Array.isArray(saved.views) || !saved.views.every(whole)) {
+    if (saved?.semsig !== "session" || saved.version !== 1) {
       throw new Error("This file is not a session of the workbench; open one that it saved.");
+    }
+    const changed = Object.entries(semsig.sessionParts).find(([key, check]) => !check(saved[key]));
+    if (changed) {
+      throw new Error(`The ${changed[0]} of this session are not as the workbench saves them; open `
+        + "the file as it was saved.");
     }
     if (saved.city?.fingerprint !== this.city.fingerprint) {
       throw new Error(`This session is about ${saved.city?.name}, and the server has `
