@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
-from semsig_gis.core import LONG_S, duration, visible, visible_lines
+from semsig_gis.core import LONG_S, duration, shortened, visible, visible_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -117,7 +117,7 @@ talk: ContextVar[Talk] = ContextVar("talk", default="plain")
 def remark(text: str) -> None:
     """Print a sentence on standard error after ``semsig:``, unless `--quiet` was given."""
     if talk.get() != "quiet":
-        complain(text)
+        complain(shortened(text))
 
 
 def complain(text: str) -> None:

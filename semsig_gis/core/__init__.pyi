@@ -179,6 +179,7 @@ from .text import escaped as escaped
 from .text import one_line as one_line
 from .text import one_lines as one_lines
 from .text import percent as percent
+from .text import shortened as shortened
 from .text import visible as visible
 from .text import visible_lines as visible_lines
 from .threads import WorkCancelledError as WorkCancelledError

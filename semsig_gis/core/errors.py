@@ -6,6 +6,8 @@ import contextlib
 import difflib
 from typing import TYPE_CHECKING
 
+from semsig_gis.core.text import shortened
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
@@ -24,6 +26,10 @@ class SemsigError(Exception):
     ...     print("montpellier" in str(error))
     True
     """
+
+    def __str__(self) -> str:
+        """Return the message without long quotations, such as of the content of a file."""
+        return shortened(super().__str__())
 
 
 class InputError(SemsigError, ValueError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import re
 import sys
 import unicodedata
 from typing import TYPE_CHECKING
@@ -16,6 +17,13 @@ HIDDEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 JOINERS = "\u200c\u200d"
 # Chances that are written as whole percents.
 LEAST_CHANCE, MOST_CHANCE = 0.01, 0.995
+# Lengths in a message, which must not repeat the content of a file.
+LONGEST_QUOTE, LONGEST_MESSAGE = 200, 3000
+# A quoted value ends with a quote at the end of a word, and begins with one where a word begins.
+_END = r"(?P=mark)(?=[\s,.;:)\]}]|$)"
+QUOTED = re.compile(
+    rf"(?<![^\s(\[{{=:,])(?P<mark>['\"])(?P<value>(?:(?!{_END}).)+){_END}", re.DOTALL
+)
 UTF16 = f"utf-16-{sys.byteorder[0]}e"
 
 
@@ -37,6 +45,30 @@ def _escape_hidden(character: str) -> str:
         return character
     units = array.array("H", character.encode(UTF16, "surrogatepass"))
     return "".join(f"\\u{unit:04x}" for unit in units)
+
+
+def shortened(message: str) -> str:
+    """Return a message with shortened quotations, and in all of at most 3,000 characters.
+
+    It keeps its end, which says what to do.
+
+    >>> len(shortened(f"field 'x' is {'7' * 10_000!r}; correct it."))
+    231
+    """
+    if len(message) <= LONGEST_QUOTE:
+        return message
+    text = QUOTED.sub(_short_quote, _without_middle(message, 2 * LONGEST_MESSAGE))
+    return _without_middle(text, LONGEST_MESSAGE)
+
+
+def _without_middle(text: str, longest: int) -> str:
+    half = longest // 2
+    return text if len(text) <= longest else f"{text[:half]} ... {text[-half:]}"
+
+
+def _short_quote(match: re.Match[str]) -> str:
+    mark, value = match["mark"], match["value"]
+    return match[0] if len(value) <= LONGEST_QUOTE else f"{mark}{value[:LONGEST_QUOTE]}...{mark}"
 
 
 def one_line(text: str) -> str:

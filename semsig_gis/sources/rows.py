@@ -31,6 +31,7 @@ from semsig_gis.core import (
     crs_label,
     epsg_code,
     nearest_name,
+    shortened,
 )
 from semsig_gis.sources.filters import Condition, as_text, matches, pattern_of
 from semsig_gis.sources.layer import RawLayer, RowCounts
@@ -323,7 +324,9 @@ def raw_layer(
             excluded=passed.excluded,
             duplicates=repeated,
         ),
-        errors=tuple(f"row {row}: {text}" for row, text in sorted(errors.items())[:MOST_ERRORS]),
+        errors=tuple(
+            f"row {row}: {shortened(text)}" for row, text in sorted(errors.items())[:MOST_ERRORS]
+        ),
         notes=(*passed.notes, *notes),
     )
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core import escaped, one_line, visible
+from semsig_gis.core import InputError, escaped, one_line, shortened, visible
 
 ASTRONAUT = "\U0001f469\u200d\U0001f680"
 HARMLESS = ("Arbre d'alignement", "\u0645\u06cc\u200c\u062e", ASTRONAUT)
@@ -43,3 +44,20 @@ def test_one_line_is_stable_and_printable(text: str) -> None:
 
 def test_escaped_text_is_one_line_without_html() -> None:
     assert escaped(" a\n& b ") == "a &amp; b"
+
+
+@pytest.mark.parametrize(
+    "value", ["7" * 300, "it's " * 90, '{"a": [' * 99, "'a " * 4_000, "é\n" * 5_000]
+)
+def test_messages_do_not_repeat_what_is_long(value: str) -> None:
+    message = f"field 'x' of layer 'trees' is {value!r}; correct it, or give 'y'."
+    short = shortened(message)
+    assert len(short) <= 3_100
+    assert short.startswith("field 'x' of layer 'trees' is ")
+    assert short.endswith("; correct it, or give 'y'.")
+    assert str(InputError(message)) == short
+
+
+def test_messages_keep_names_and_apostrophes() -> None:
+    message = f"the catalogue's not: {'level 3, ' * 40}or 'x'; give the city's name."
+    assert shortened(message) == message
