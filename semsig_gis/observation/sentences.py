@@ -5,6 +5,8 @@ Distances in words become rough ranges with an error that includes a person's gu
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
 import re
 from dataclasses import replace
@@ -375,12 +377,17 @@ def _ranges(
 
 
 def _texts(values: Row, name: str) -> tuple[str, ...]:
-    """Return what was read, as text, or as a list of it.
+    """Return what was read, as a list of text, or as text.
 
-    A number is text as well, and None is nothing.
+    Text in the cell of a table may be such a list as JSON, or have semicolons between its parts. A
+    number is text as well, and None is nothing.
     """
     items = values.get(name, [])
-    items = [items] if isinstance(items, str) else items
+    if isinstance(items, str):
+        with contextlib.suppress(ValueError):
+            items = json.loads(items) if items.startswith("[") else items
+    if isinstance(items, str):
+        items = [part.strip() for part in items.split(";")]
     if not isinstance(items, list) or any(isinstance(item, (list, dict)) for item in items):
         raise InputError(f"{name} were given as {items!r:.60}; give a list of text.")
     return tuple("" if item is None else str(item) for item in items)

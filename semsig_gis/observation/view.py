@@ -314,7 +314,7 @@ class View(Signature):
             if len(texts) != len(self):
                 raise InputError(
                     f"{len(texts)} texts were given for {len(self)} objects; give one for each, "
-                    "empty where nothing was read."
+                    "empty where nothing was read, and with ; between them in the cell of a table."
                 )
             object.__setattr__(self, "texts", texts if any(texts) else None)
         signs = _read_texts("signs", self.signs)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,6 +83,10 @@ SAME = """
 {"types": null, "bearings": []}
 {"detections": []}
 {"see": " "}
+
+{"types": "LD", "bearings": [40, 80], "texts": ["Café", ""]}
+{"types": "LD", "bearings": "40 80", "texts": "Café; "}
+{"types": "LD", "bearings": "40 80", "texts": "[\\"Café\\", null]"}
 
 {"types": "DL"}
 {"see": "lamp, bench"}
@@ -363,6 +368,16 @@ def test_sentences_of_people_are_understood(language: str) -> None:
     assert len(SENTENCES[language]) == 30
     for text, meaning in SENTENCES[language].items():
         assert understood_parts(text) == expected_parts(meaning), text
+
+
+def test_sentences_of_the_case_are_understood_or_name_what_was_not() -> None:
+    file = Path(__file__).parents[1] / "cases" / "K_words" / "sentences.txt"
+    for line in file.read_text(encoding="utf-8").splitlines():
+        count = len(line.replace(" and ", ", ").split(", "))
+        try:
+            assert len(understood_parts(line)) >= count, line
+        except SemsigError as error:
+            assert re.search(r"the number (30|42,5)\b", str(error)), line
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 from noisy_cells import column, parts_of
@@ -21,12 +22,10 @@ from semsig_gis.observation import (
     View,
     ViewBuilder,
     parse_queries,
+    read_pictures,
     read_shots,
 )
 from semsig_gis.sources import built_in_taxonomy, paper_taxonomy
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 TAXONOMY = built_in_taxonomy()
 BUILDER = ViewBuilder(
@@ -105,6 +104,10 @@ def test_picture_that_cannot_be_read_is_no_obstacle_where_all_is_known(tmp_path:
     ((_, view),), tally = builder.views([boxes])
     assert view.to_dict(TAXONOMY) == single_view(BUILDER, boxes).to_dict(TAXONOMY)
     assert "HEIC" in tally.unread["a.heic"]
+    case = Path(__file__).parents[2] / "cases" / "G21_heic" / "detections.json"
+    pictures, _ = read_pictures([case])
+    _, tally = replace(builder, folders=None).views(pictures)
+    assert list(tally.unread) == ["p1.heic"]
     for shot in (Shot(fov=90.0), Shot(heading=0.0), Shot(fov=90.0, heading=0.0)):
         with refused(InputError, "HEIC"):
             replace(builder, shot=shot).views([picture(box(), name="a.heic", size=None)])
