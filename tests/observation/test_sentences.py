@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -370,14 +369,18 @@ def test_sentences_of_people_are_understood(language: str) -> None:
         assert understood_parts(text) == expected_parts(meaning), text
 
 
+UNCLEAR = {"bench 30, lamp 80, tree 120": "30 in", "bench at 42,5, lamp at 80": "42,5 is"}
+
+
 def test_sentences_of_the_case_are_understood_or_name_what_was_not() -> None:
     file = Path(__file__).parents[1] / "cases" / "K_words" / "sentences.txt"
     for line in file.read_text(encoding="utf-8").splitlines():
-        count = len(line.replace(" and ", ", ").split(", "))
-        try:
+        if line in UNCLEAR:
+            with refused(SemsigError, f"the number {UNCLEAR[line]}", "write"):
+                understood_parts(line)
+        else:
+            count = len(line.replace(" and ", ", ").split(", "))
             assert len(understood_parts(line)) >= count, line
-        except SemsigError as error:
-            assert re.search(r"the number (30|42,5)\b", str(error)), line
 
 
 @pytest.mark.parametrize(
