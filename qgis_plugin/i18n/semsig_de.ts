@@ -436,8 +436,8 @@
         <translation>Katalog entwerfen</translation>
     </message>
     <message>
-        <source>Draft a catalogue for a vector file, for you to edit.</source>
-        <translation>Entwirft einen Katalog für eine Vektordatei, den Sie bearbeiten.</translation>
+        <source>Draft a catalogue for a vector file or a folder of files, for you to edit.</source>
+        <translation>Entwirft einen Katalog für eine Vektordatei oder einen Ordner mit Dateien, den Sie bearbeiten.</translation>
     </message>
     <message>
         <source>Draw a map</source>
@@ -1624,8 +1624,8 @@
         <translation>Nur den Zwischenspeicher verwenden.</translation>
     </message>
     <message>
-        <source>Vector file to draft a catalogue for.</source>
-        <translation>Vektordatei, für die ein Katalog entworfen wird.</translation>
+        <source>Vector file, or folder of files, to draft for.</source>
+        <translation>Vektordatei oder Ordner mit Dateien für den Entwurf.</translation>
     </message>
     <message>
         <source>Viewpoints</source>

@@ -436,8 +436,8 @@
         <translation>Ébaucher un catalogue</translation>
     </message>
     <message>
-        <source>Draft a catalogue for a vector file, for you to edit.</source>
-        <translation>Ébauche un catalogue pour un fichier vectoriel, à modifier par vous.</translation>
+        <source>Draft a catalogue for a vector file or a folder of files, for you to edit.</source>
+        <translation>Ébauche un catalogue pour un fichier vectoriel ou un dossier de fichiers, à modifier par vous.</translation>
     </message>
     <message>
         <source>Draw a map</source>
@@ -1624,8 +1624,8 @@
         <translation>N’utiliser que le cache.</translation>
     </message>
     <message>
-        <source>Vector file to draft a catalogue for.</source>
-        <translation>Fichier vectoriel pour lequel ébaucher un catalogue.</translation>
+        <source>Vector file, or folder of files, to draft for.</source>
+        <translation>Fichier vectoriel, ou dossier de fichiers, pour l’ébauche.</translation>
     </message>
     <message>
         <source>Viewpoints</source>

@@ -1,4 +1,4 @@
-"""`semsig draft`: a catalogue for a vector file."""
+"""`semsig draft`: a catalogue for a vector file, or for all files of a folder."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from semsig_gis.commands.model import Option, Reporter, Result, command
     group="Prepare",
     order=4,
     examples=(
-        "semsig draft trees.geojson",
+        "semsig draft my_city/",
         "semsig draft lamps.shp --crs EPSG:2154",
     ),
 )
 @dataclass(frozen=True, kw_only=True)
 class Draft:
-    """Draft a catalogue for a vector file, for you to edit."""
+    """Draft a catalogue for a vector file or a folder of files, for you to edit."""
 
     file: Annotated[
-        Path, Option("Vector file to draft a catalogue for.", positional=True, reads=True)
+        Path,
+        Option("Vector file, or folder of files, to draft for.", positional=True, reads=True),
     ]
     crs: Crs = None
 

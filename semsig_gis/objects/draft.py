@@ -8,7 +8,8 @@ import itertools
 import json
 import re
 import tempfile
-from dataclasses import dataclass, replace
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,8 @@ from semsig_gis.core import (
     require_metric_crs,
     temporary_folder,
 )
+from semsig_gis.objects.draft_folder import known_sources, need_of, sort_files
+from semsig_gis.objects.draft_layers import LayerDraft, own_classes, shared_layers, snake
 from semsig_gis.objects.guesses import (
     VECTOR,
     ClassGuess,
@@ -44,15 +47,15 @@ from semsig_gis.sources import (
     LayerSpec,
     built_in_taxonomy,
     for_crs,
+    is_folder,
     load_catalog,
     no_positions,
     off_the_globe,
     reader,
-    words_of,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from semsig_gis.core import AnyCrs
     from semsig_gis.objects.guesses import Column, LayerSample
@@ -67,50 +70,10 @@ FILTERS_SHOWN = 8
 VALUES_SHOWN = 6
 # Maximum number of rows per value of a field that may identify objects.
 MAX_ROWS_PER_ID = 10
-# Minimum share of rows whose class a field names, for it to decide; and the minimum share of other
+# Minimum share of rows with a class by a field, for it to decide; and the minimum share of other
 # classes than that of the name of the layer.
 MIN_NAMED, MIN_OTHERS = 0.5, 0.2
 GEOMETRIES = {"Point": "point", "LineString": "line", "LinearRing": "line", "Polygon": "polygon"}
-
-
-@dataclass(frozen=True, slots=True)
-class _Draft:
-    """Facts and guesses about a layer."""
-
-    file: Path
-    sample: LayerSample
-    columns: tuple[Column, ...]
-    geometry: str | None
-    guess: ClassGuess
-    class_by: tuple[str, dict[str, str]] | None
-    mixed: bool
-    positions: PositionFields | None
-    crs: str | None
-    crs_reason: str = ""
-
-    @property
-    def unlisted(self) -> dict[str, int]:
-        """Numbers of rows whose value of the field `class_by` names no class."""
-        if self.class_by is None:
-            return {}
-        field, classes = self.class_by
-        (column,) = (column for column in self.columns if column.name == field)
-        counts = {
-            str(value): count
-            for value, count in column.counts.most_common()
-            if value not in classes
-        }
-        return counts | ({f"no {field}": column.missing} if column.missing else {})
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether all rows were read."""
-        return len(self.sample.rows) == self.sample.info.rows
-
-    @property
-    def needs_class(self) -> bool:
-        """Whether some rows get the class of the layer."""
-        return not self.mixed or bool(self.unlisted) or not self.is_whole
 
 
 def draft_catalog(path: str | Path, *, crs: AnyCrs | None = None) -> str:
@@ -140,6 +103,7 @@ def draft_catalog(path: str | Path, *, crs: AnyCrs | None = None) -> str:
     Examples
     --------
     >>> import tempfile
+    from collections import Counter
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder, "town_benches.csv")
     ...     _ = path.write_text("id;lon;lat;wood\n7;3.88;43.61;yes\n8;3.89;43.61;no\n")
@@ -158,31 +122,101 @@ def draft_catalog(path: str | Path, *, crs: AnyCrs | None = None) -> str:
     # Fields: id, lon, lat, wood
     """
     path = Path(path)
+    stated = None if crs is None else crs_text(crs)
+    if is_folder(path):
+        return _folder(path, stated)
+    need = need_of(path) if path.exists() else ""
+    drafts, remarks = _drafts(path, stated)
+    if need.startswith("no catalogue"):
+        remarks.insert(0, f"{path.name}: {need}")
+    return _loading(path, drafts, remarks)
+
+
+def _folder(folder: Path, crs: str | None) -> str:
+    """Draft a catalogue for all files of a folder that need one."""
+    files, lines = sort_files(folder)
+    remarks: list[str] = []
+    layers_of: dict[Path, list[LayerDraft]] = {}
+
+    def usable(file: Path, make: Callable[[], object]) -> bool:
+        try:
+            make()
+        except SemsigError as error:
+            lines.append(f"{file.name}: left out: {str(error).rstrip('.')}")
+            return False
+        return True
+
+    def draft(file: Path) -> None:
+        layers_of[file], about = _drafts(file, crs)
+        remarks.extend(about)
+
+    def together() -> str:
+        if not layers_of:
+            raise SourceError(
+                f"{folder} has no file that a catalogue can be drafted for; "
+                f"{'; '.join(lines) or 'it is empty'}."
+            )
+        drafts = [item for layers in layers_of.values() for item in layers]
+        return _loading(folder, shared_layers(drafts, folder), [*remarks, *lines])
+
+    for file in files:
+        usable(file, lambda file=file: draft(file))  # type: ignore[misc] # bound at once
+    try:
+        return together()
+    except SourceError:
+        # Files that do not load are left out; if each one loads, they do not go together.
+        loadable = {
+            file: layers
+            for file, layers in layers_of.items()
+            if usable(file, lambda file=file, layers=layers: _loading(file, layers, []))  # type: ignore[misc] # bound at once
+        }
+        if len(loadable) == len(layers_of):
+            raise
+        layers_of = loadable
+        return together()
+
+
+def _drafts(path: Path, crs: str | None) -> tuple[list[LayerDraft], list[str]]:
+    """Return the layers of a file, and comments on it."""
     items = sample_layers(path)
     layers = [item for item in items if item.placed or item.positions]
     if not layers:
         fields = items[0].info.fields
         raise SourceError(f"{path} has no layer with positions and {no_positions(fields)}.")
-    stated = None if crs is None else crs_text(crs)
-    drafts = [_draft(path, item, stated) for item in layers]
-    lines = [
-        f"# Draft of a catalogue for {_text(path.name)}, from its names, fields and values.",
-        f"# Check every line; what only a person can know is marked {EDIT}.",
-        "",
-        f"name = {_text(_snake(path.stem))}",
-        f"title = {_text(path.stem)}",
-        f'license = "unknown"  # {EDIT}: what the publisher allows',
-        f'attribution = ""  # {EDIT}: the line that the publisher asks for',
-        _metric_crs(layers),
-    ]
-    if layers[0].reader != VECTOR:
-        lines.append(f"reader = {_text(layers[0].reader)}")
-    lines += _classes(drafts)
-    for name, draft in zip(_unique(_snake(item.info.name) for item in layers), drafts, strict=True):
-        lines += ["", *_stanza(name, draft, several=len(layers) > 1)]
+    drafts = [_draft(path, item, crs) for item in layers]
+    remarks = known_sources(path, drafts[0].columns, len(layers[0].rows))
     if len(layers) < len(items):
         tables = ", ".join(_text(item.info.name) for item in items if item not in layers)
-        lines += ["", f"# Left out, because they have no geometry: {tables}"]
+        remarks.append(f"Left out, because they have no geometry: {tables}")
+    return drafts, remarks
+
+
+def _loading(path: Path, drafts: Sequence[LayerDraft], remarks: Sequence[str]) -> str:
+    """Return the catalogue of a file or folder; SourceError if it cannot load that."""
+    drafts = own_classes(drafts)
+    readers = Counter(draft.sample.reader for draft in drafts)
+    ((usual, _),) = readers.most_common(1)
+    title = path.name if is_folder(path) else path.stem
+    title = title or path.resolve().name  # of the working folder
+    name = path.name or title
+    lines = [
+        f"# Draft of a catalogue for {_text(name)}, from its names, fields and values.",
+        f"# Check every line; what only a person can know is marked {EDIT}.",
+        *(f"# {_plain(remark)}" for remark in remarks),
+        "",
+        f"name = {_text(snake(title))}",
+        f"title = {_text(title)}",
+        f'license = "unknown"  # {EDIT}: what the publisher allows',
+        f'attribution = ""  # {EDIT}: the line that the publisher asks for',
+        _metric_crs([draft.sample for draft in drafts]),
+    ]
+    if usual != VECTOR:
+        lines.append(f"reader = {_text(usual)}")
+    lines += _classes(drafts)
+    in_file = Counter(draft.file for draft in drafts)
+    names = _unique(snake(draft.name) for draft in drafts)
+    for name, draft in zip(names, drafts, strict=True):
+        lines += ["", *_stanza(name, draft, several=in_file[draft.file] > 1, usual=usual)]
     text = "\n".join(lines) + "\n"
     _require_loads(text, path)
     return text
@@ -196,19 +230,20 @@ def _require_loads(text: str, path: Path) -> None:
         try:
             catalog = load_catalog(file)
             layers, _ = read_files(catalog.layers, [path])
-            if any(layer.spec.role == "objects" for layer in layers):
+            empty = any(layer.table.geometry.isna().all() for layer in layers)
+            if not empty and any(layer.spec.role == "objects" for layer in layers):
                 assemble(layers, catalog)
-        except EmptyResultError as error:
-            raise SourceError(
-                f"{path} has no layer with positions; give a file that has one."
-            ) from error
+        except EmptyResultError:
+            empty = True
         except SemsigError as error:
             raise SourceError(
                 f"no catalogue can be drafted for {path}: {str(error).rstrip('.')}."
             ) from error
+    if empty:
+        raise SourceError(f"{path} has no layer with positions; give a file that has one.")
 
 
-def _draft(path: Path, sample: LayerSample, crs: str | None) -> _Draft:
+def _draft(path: Path, sample: LayerSample, crs: str | None) -> LayerDraft:
     columns = columns_of(sample)
     geometry = GEOMETRIES.get(sample.info.geometry.removeprefix("3D ").removeprefix("Multi"))
     names = f"{path.stem} / {sample.info.name}"
@@ -217,14 +252,13 @@ def _draft(path: Path, sample: LayerSample, crs: str | None) -> _Draft:
     candidates = [column for column in columns if column.meant_for("filter") or not guess.sure]
     class_by = None if guess.is_role else guess_class_by(candidates, guess.name, sure=guess.sure)
     mixed = class_by is not None and _is_mixed(class_by, columns, guess, rows)
-    if not guess.name or (mixed and not guess.sure):  # a class of its own, named after the file
-        name = re.sub(r"[^a-z0-9]+", "_", _snake(path.stem)).strip("_")
-        guess = ClassGuess(name if name[:1].isalpha() else f"layer_{name}".rstrip("_"))
+    if mixed and not guess.sure:
+        guess = ClassGuess()  # a class of its own for other values
     positions = sample.positions
     if crs is not None and positions is not None:
         positions = for_crs(positions, sample.rows, crs)
     crs, crs_reason = _crs(path, sample, positions, crs)
-    return _Draft(
+    return LayerDraft(
         path, sample, columns, geometry, guess, class_by, mixed, positions, crs, crs_reason
     )
 
@@ -235,10 +269,10 @@ def _is_mixed(
     """Whether a field gives the classes of most rows, and the name of the layer does not."""
     field, classes = class_by
     (counts,) = (column.counts for column in columns if column.name == field)
-    named = sum(counts[value] for value in classes)
+    rows_named = sum(counts[value] for value in classes)
     others = sum(counts[value] for value, name in classes.items() if name != guess.name)
     several = len(set(classes.values())) > 1
-    return several and named >= MIN_NAMED * rows and others >= MIN_OTHERS * rows * guess.sure
+    return several and rows_named >= MIN_NAMED * rows and others >= MIN_OTHERS * rows * guess.sure
 
 
 def _crs(
@@ -283,7 +317,7 @@ def _metric_crs(layers: Sequence[LayerSample]) -> str:
     return "# Without metric_crs, distances are computed in the UTM zone of the data."
 
 
-def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
+def _classes(drafts: Sequence[LayerDraft]) -> Iterator[str]:
     """Yield stanzas for classes that are not built in."""
     taxonomy = built_in_taxonomy()
     built_in = {item.name for item in taxonomy.classes}
@@ -297,12 +331,17 @@ def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
                 yield f"{key} = {json.dumps(getattr(item, key), ensure_ascii=False)}"
 
 
-def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
+def _stanza(name: str, draft: LayerDraft, *, several: bool, usual: str) -> Iterator[str]:
+    """Yield the lines of a layer, in a file with `several`; `usual` is the catalogue's reader."""
     info = draft.sample.info
     yield "[[layers]]"
     yield f"name = {_text(name)}"
     yield from _class(draft)
-    yield f"files = [{_text(glob.escape(draft.file.name))}]"
+    yield f"files = [{_text(draft.pattern or glob.escape(draft.file.name))}]"
+    if draft.remark:
+        yield f"# {EDIT}: {_plain(draft.remark)}"
+    if draft.sample.reader != usual:
+        yield f"reader = {_text(draft.sample.reader)}"
     if several:
         yield f"layer = {_text(info.name)}"
     if info.encoding is not None:
@@ -317,16 +356,17 @@ def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
     else:
         yield f"# geometry is of several kinds ({info.geometry}); centroids are used."
     yield from _place(draft)
-    least, most = (info.rows + 1) // 2, info.rows * 2
+    sizes = [part.sample.info.rows for part in (draft, *draft.others)]
     yield (
-        f"rows = [{least}, {most}]  # now {info.rows:,}; loading reports when there are "
-        "fewer or more"
+        f"rows = [{(min(sizes) + 1) // 2}, {max(sizes) * 2}]  # now "
+        f"{' and '.join(f'{size:,}' for size in sizes)}; loading reports when there are fewer or "
+        "more"
     )
     yield from _filters(draft)
     yield f"# Fields: {', '.join(_plain(field) for field in info.fields) or 'none'}"
 
 
-def _class(draft: _Draft) -> Iterator[str]:
+def _class(draft: LayerDraft) -> Iterator[str]:
     """Yield the lines with the class or the role, and with the field that decides the class."""
     guess = draft.guess
     line = f"{'role' if guess.is_role else 'class'} = {_text(guess.name)}  # "
@@ -337,7 +377,7 @@ def _class(draft: _Draft) -> Iterator[str]:
             unlisted = [f"{_text(value)} ({rows:,})" for value, rows in draft.unlisted.items()]
             more = f", and {len(unlisted) - VALUES_SHOWN} more" * (len(unlisted) > VALUES_SHOWN)
             such = f": {', '.join(unlisted[:VALUES_SHOWN])}{more}" if unlisted else ""
-            yield f"{line}{EDIT}: of rows whose {_plain(field)} is not listed in class_by{such}"
+            yield f"{line}{EDIT}: of rows without a {_plain(field)} that class_by lists{such}"
         otherwise = ', otherwise = "class"' * draft.needs_class
         values = ", ".join(
             f"{_key(_exactly(value))} = {_text(name)}" for value, name in classes.items()
@@ -357,8 +397,12 @@ def _class(draft: _Draft) -> Iterator[str]:
         yield f"{line}{EDIT}: {_plain(guess.reason)}{others}"
 
 
-def _identifier(draft: _Draft) -> Iterator[str]:
+def _identifier(draft: LayerDraft) -> Iterator[str]:
     """Yield the line with the identifier of rows, or comments on possible ones."""
+    if draft.others:
+        yield f"id_field = {_text(draft.id_field)}  # a different value in every row of the files"
+        yield "unique_id = true"
+        return
     rows = len(draft.sample.rows)
     where = "every row" if rows == draft.sample.info.rows else f"each of the first {rows:,} rows"
     identifiers = [column for column in draft.columns if column.meant_for("identifier")]
@@ -391,7 +435,7 @@ def _identifier(draft: _Draft) -> Iterator[str]:
             return
 
 
-def _place(draft: _Draft) -> Iterator[str]:
+def _place(draft: LayerDraft) -> Iterator[str]:
     """Yield the lines with the fields of positions and the CRS."""
     found = draft.positions
     if found is not None:
@@ -415,7 +459,7 @@ def _place(draft: _Draft) -> Iterator[str]:
         yield f"crs = {_text(draft.crs)}{comment}"
 
 
-def _filters(draft: _Draft) -> Iterator[str]:
+def _filters(draft: LayerDraft) -> Iterator[str]:
     """Yield comments with fields of few values, and with a field that may contain the class."""
     rows = len(draft.sample.rows)
     sampled = "" if rows == draft.sample.info.rows else f" (seen in the first {rows:,} rows)"
@@ -466,10 +510,6 @@ def _exactly(value: str) -> str:
 
 def _key(name: str) -> str:
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
-
-
-def _snake(text: str) -> str:
-    return "_".join(words_of(text)) or "layer"
 
 
 def _unique(names: Iterable[str]) -> Iterator[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import re
+import shlex
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -19,6 +21,7 @@ from semsig_gis.sources import (
     LayerInfo,
     ServiceRecord,
     decimal,
+    file_reader,
     find_positions,
     first_rows,
     fold,
@@ -69,9 +72,13 @@ class LayerSample:
 def sample_layers(path: Path) -> tuple[LayerSample, ...]:
     """Return samples of the layers of a file; SourceError if no catalogue can be made of it."""
     suffix = path.suffix.lower()
-    if path.name.lower().endswith(tuple(FORMATS)):
+    is_osm = path.name.lower().endswith(tuple(FORMATS))
+    with contextlib.suppress(SourceError):  # a table of a portal
+        is_osm = is_osm or file_reader(path) == "overpass"
+    if is_osm:
         raise SourceError(
-            f"{path} is OpenStreetMap data; load it with the built-in catalogue 'openstreetmap'."
+            f"{path} is OpenStreetMap data, and no catalogue is needed: `semsig load "
+            f"{shlex.quote(str(path))}` reads it with the built-in one, 'openstreetmap'."
         )
     layers: tuple[LayerSample, ...] = ()
     try:
@@ -212,8 +219,8 @@ def guess_class(
         other_names = tuple(match.name for match in rivals)
         sure = not (first.doubt or other_names)
         return ClassGuess(first.name, reason=_reason(first), others=other_names, sure=sure)
-    if named := keywords("class_names").find(names):
-        first, *others = named
+    if matches := keywords("class_names").find(names):
+        first, *others = matches
         return ClassGuess(
             first.name, reason=_reason(first), others=tuple(match.name for match in others)
         )
@@ -276,8 +283,8 @@ def _classes_of_values(column: Column, *, sure: bool) -> dict[str, str]:
         # What stands before a comma or parenthesis is the thing, as in "Street light (LED)".
         for text in dict.fromkeys([value, VALUE_END.split(value)[0]]):
             names += [match.name for match in keywords("classes").find(text)[:1] if not match.doubt]
-            named = [] if sure else keywords("class_names").find(text)[:1]
-            names += [match.name for match in named if match.words == " ".join(words_of(text))]
+            exact = [] if sure else keywords("class_names").find(text)[:1]
+            names += [match.name for match in exact if match.words == " ".join(words_of(text))]
         if name := next(filter(None, names), None):
             classes[value] = name
     return classes

@@ -39,6 +39,7 @@ from .clip import parse_area as parse_area
 from .compression import HARMLESS_BYTES as HARMLESS_BYTES
 from .compression import check_compression_ratio as check_compression_ratio
 from .csv_layer import NO_GEOMETRY as NO_GEOMETRY
+from .detect import PICTURES as PICTURES
 from .detect import detect_catalogs as detect_catalogs
 from .downloads import fetch_layers as fetch_layers
 from .downloads import find_area as find_area
@@ -94,7 +95,9 @@ from .parquet import SUFFIXES as SUFFIXES
 from .parquet import read_parquet as read_parquet
 from .paths import FILE_SUFFIXES as FILE_SUFFIXES
 from .paths import files_in as files_in
+from .paths import is_folder as is_folder
 from .paths import is_geodatabase as is_geodatabase
+from .paths import matches_pattern as matches_pattern
 from .paths import require_file as require_file
 from .positions import PositionFields as PositionFields
 from .positions import find_positions as find_positions

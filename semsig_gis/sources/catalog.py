@@ -384,7 +384,6 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
         "layers": tuple(
             dataclasses.replace(
                 spec,
-                reader=file.reader,
                 extended=any(
                     item.shape != "point" for item in taxonomy.classes if item.name in spec.classes
                 ),
@@ -408,8 +407,8 @@ def catalog_schema() -> dict[str, Any]:
     """Return the JSON Schema of catalogues, ``catalog.schema.json``."""
     schema = json_schema(CatalogFile, described_by=Catalog)
     layer = schema["$defs"]["LayerSpec"]["properties"]
-    # All layers of a catalogue have its reader, and the shapes of its classes.
-    del layer["reader"], layer["extended"]
+    # A layer has the shapes of its classes.
+    del layer["extended"]
     layer["class"]["examples"] = [item.name for item in built_in_taxonomy().classes]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
@@ -433,8 +432,8 @@ def _inherited_keys(layer: dict[str, Any]) -> tuple[str, ...]:
     """Return the keys that a layer has from its catalogue if it lacks them."""
     role = layer.get("role", "objects")
     if "derive" in layer:
-        return "license", "attribution"
-    keys: tuple[str, ...] = ("files", "license", "attribution")
+        return "reader", "license", "attribution"
+    keys: tuple[str, ...] = ("reader", "files", "license", "attribution")
     keys += ("not", "texts") if role == "objects" else ()
     return (*keys, "height_field", "levels_field") if role in ("objects", "buildings") else keys
 

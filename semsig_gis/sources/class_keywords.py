@@ -110,12 +110,12 @@ class Keywords:
         words = words_of(text)
         none = (("", phrase) for phrase in _neighbours().none)
         spans = [
-            _Span(start, found[0], name, phrase, found[1])
+            _Span(start, at[0], name, phrase, at[1])
             for name, phrase in (*self.phrases, *none)
             for start in range(len(words))
             if words[start].startswith(phrase[0])  # most fail here
-            and (found := _end(words, start, phrase))
-            and not (self.whole and found[1])
+            and (at := _end(words, start, phrase))
+            and not (self.whole and at[1])
         ]
         # Python's sort keeps the order of the file among keywords of the same length.
         spans.sort(key=lambda span: (-span.letters, span.start))
@@ -232,12 +232,12 @@ def keywords(kind: str) -> Keywords:
         groups = content["fields"].items()
         return Keywords.of((name, word) for name, words in groups for word in words)
     if kind == "class_names":
-        named = [
+        pairs = [
             (name, word)
             for name, lists in content["classes"].items()
             for word in (name.replace("_", " "), *lists.get(SPOKEN, {}).get("en", ()))
         ]
-        return Keywords.of(named, whole=True, before_heads=[word for _, word in named])
+        return Keywords.of(pairs, whole=True, before_heads=[word for _, word in pairs])
     fields = kind == "class_fields"
     lists = [
         (name, key, word)

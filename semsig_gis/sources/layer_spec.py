@@ -104,7 +104,6 @@ _Tags = Annotated[
     Parsed(_tags, Annotated[dict[str, _Tag], length(1)]),
 ]
 _Count = Annotated[int, number("a number of rows", 0, whole=True)]
-_OfCatalog = Annotated[str, Accepts("it at the top, for all layers", {"type": "none"})]
 _OfClasses = Annotated[bool, Accepts("the shape of its class", {"type": "none"})]
 TextFields = Annotated[tuple[tuple[str, str], ...], pairs(Text)]
 _Width = Annotated[float, metres(MAX_WIDTH_M)]
@@ -219,7 +218,7 @@ class LayerSpec:
     optional : bool
         Whether the layer is read only on request.
     reader : str
-        The reader of its file.
+        The reader of its file; by default that of the catalogue.
     extended : bool
         Whether one of its classes is a line or an area.
     note : str
@@ -266,7 +265,7 @@ class LayerSpec:
     elements: tuple[ElementKind, ...] = ("node", "way", "relation")
     role: Role = "objects"
     optional: Flag = False
-    reader: _OfCatalog = "vector_file"
+    reader: str = "vector_file"
     extended: _OfClasses = False
     note: str = ""
     license: str = "unknown"
