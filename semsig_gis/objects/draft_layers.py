@@ -67,8 +67,9 @@ class LayerDraft:
         info = self.sample.info
         # Files of an unknown class hold the same things if their names begin with the same word.
         thing = self.guess.name or snake(self.file.stem).partition("_")[0]
-        return (self.file.suffix.lower(), self.sample.reader, info.fields, info.crs, info.encoding,
-                thing, self.geometry, self.mixed, self.positions, self.crs, self.id_field)  # fmt: skip
+        form = self.file.suffix.lower(), self.sample.reader, info.fields, info.crs, info.encoding
+        place = self.geometry, self.positions, self.crs
+        return *form, *place, thing, self.mixed, self.id_field
 
     @property
     def unlisted(self) -> dict[str, int]:
