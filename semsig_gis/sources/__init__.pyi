@@ -5,6 +5,8 @@ from .area import advice as advice
 from .area import elsewhere_error as elsewhere_error
 from .area import join_areas as join_areas
 from .area import other_orders as other_orders
+from .area_file import NUMBERS as NUMBERS
+from .area_file import names_place as names_place
 from .area_file import read_polygons as read_polygons
 from .catalog import MEASURES as MEASURES
 from .catalog import Catalog as Catalog
@@ -29,11 +31,9 @@ from .class_keywords import words_for as words_for
 from .class_keywords import words_of as words_of
 from .clip import BOX as BOX
 from .clip import NO_CLIP as NO_CLIP
-from .clip import NUMBERS as NUMBERS
 from .clip import clip_layer as clip_layer
 from .clip import clip_layers as clip_layers
 from .clip import clip_to_extents as clip_to_extents
-from .clip import names_place as names_place
 from .clip import note_outside as note_outside
 from .clip import parse_area as parse_area
 from .compression import HARMLESS_BYTES as HARMLESS_BYTES

@@ -52,7 +52,8 @@ class Area:
         """What else the user may have meant, with the words for it."""
         if self.numbers:
             for words, box in other_orders(self.numbers):
-                yield words, Area(shapely.box(*box), self.name)
+                if words == EXCHANGED or max(sides_of(box)) < WIDE_DEGREES:
+                    yield words, Area(shapely.box(*box), self.name)
             return
         polygon = shapely.transform(self.polygon, lambda xy: xy[:, ::-1])
         _, south, _, north = polygon.bounds

@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
-from semsig_gis.core import CrsError, InputError
+from semsig_gis.core import CrsError, InputError, listed
 from semsig_gis.sources import vector
 from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.parquet import SUFFIXES, read_parquet
-from semsig_gis.sources.paths import require_file
+from semsig_gis.sources.paths import FILE_SUFFIXES, require_file
 from semsig_gis.sources.rows import WGS84, fits_the_globe
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import geopandas as gpd
 
+NUMBERS = re.compile(r"[\s\[(]*[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*[\])\s]*")
 POLY = ".poly"
 LEAST_CORNERS = 3
+
+
+def names_place(text: str) -> bool:
+    """Whether a text is the name of a place, not numbers and not a path, existing or missing."""
+    path = Path(text)
+    is_file = path.suffix.lower() in FILE_SUFFIXES or path.is_file()
+    return not is_file and not NUMBERS.fullmatch(text)
 
 
 def read_polygons(path: Path) -> gpd.GeoSeries:
@@ -30,13 +38,18 @@ def read_polygons(path: Path) -> gpd.GeoSeries:
     CRS and has other numbers than degrees.
     """
     suffix = path.suffix.lower()
+    if names_place(str(path)):
+        raise InputError(
+            f"area {str(path)!r} is neither a bounding box nor a file; write west,south,east,north "
+            "in degrees, or the path of a file with polygons."
+        )
     if suffix in SUFFIXES:
         return read_parquet(path, kind="polygons").geometry
     if suffix == POLY:
         import geopandas as gpd  # noqa: PLC0415 - 0.7 s
 
         return gpd.GeoSeries([_read_poly(path)], crs=WGS84)
-    spec = LayerSpec(name="area", class_name="", geometry="polygon")
+    spec = LayerSpec(name="area", class_name="", geometry="polygon", layer=_layer_name(path))
     try:
         layer = vector.read_layer(path, spec)
     except CrsError:
@@ -54,7 +67,26 @@ def read_polygons(path: Path) -> gpd.GeoSeries:
             f"{path} has {layer.counts.unreadable} polygons that cannot be read "
             f"({layer.errors[0]}); correct the file."
         )
-    return layer.table.geometry
+    shapes = layer.table.geometry
+    # The outline of an area may be a line that ends where it begins.
+    closed = (shapes.geom_type == "LineString") & shapes.is_closed
+    shapes[closed] = [shapely.Polygon(line.coords) for line in shapes[closed]]
+    return shapes
+
+
+def _layer_name(path: Path) -> str | None:
+    """Return the name of the only layer of polygons of a file with several layers."""
+    layers = vector.list_layers(path)
+    if len(layers) < 2:  # noqa: PLR2004
+        return None
+    names = [layer.name for layer in layers if "Polygon" in layer.geometry]
+    if len(names) == 1:
+        return names[0]
+    raise InputError(
+        f"{path} has {len(names) or 'no'} layers of polygons ({listed([i.name for i in layers])}); "
+        f"write one to a file of its own, such as by `ogr2ogr area.gpkg {path.name} "
+        f"{(names or ['LAYER'])[0]}`."
+    )
 
 
 def _read_poly(path: Path) -> shapely.Geometry:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -28,9 +27,8 @@ from semsig_gis.sources.area import (
     other_orders,
     sides_of,
 )
-from semsig_gis.sources.area_file import read_polygons
+from semsig_gis.sources.area_file import NUMBERS, read_polygons
 from semsig_gis.sources.layer import transformed
-from semsig_gis.sources.paths import FILE_SUFFIXES
 from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
 
 if TYPE_CHECKING:
@@ -41,7 +39,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources.layer import RawLayer
 
-NUMBERS = re.compile(r"[\s\[(]*[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*[\])\s]*")
 T = TypeVar("T", shapely.Polygon | shapely.MultiPolygon, "NDArray[np.object_]")
 # The text by which a user requests the bounding box that a file states.
 BOX = "box"
@@ -56,11 +53,6 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
     """Return the area of ``"west,south,east,north"`` in degrees, of polygons, or of a file."""
     if not isinstance(text, str):
         return _area_of(text.geometry, "the table", name="table", kind="table")
-    if names_place(text):
-        raise InputError(
-            f"area {text!r} is neither a bounding box nor a file; write west,south,east,north in "
-            "degrees, or the path of a file with polygons."
-        )
     if not NUMBERS.fullmatch(text):
         path = Path(text)
         return _area_of(read_polygons(path), str(path), name=path.stem, kind="file")
@@ -93,13 +85,6 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
     boxes = [shapely.box(start, south, end, north) for start, end in spans if start < end]
     polygon = boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes)
     return Area(polygon, text, numbers)
-
-
-def names_place(text: str) -> bool:
-    """Whether a text is the name of a place, not numbers and not a path, existing or missing."""
-    path = Path(text)
-    is_file = path.suffix.lower() in FILE_SUFFIXES or path.is_file()
-    return not is_file and not NUMBERS.fullmatch(text)
 
 
 def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tuple[RawLayer, ...]:

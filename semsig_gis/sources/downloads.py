@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from platformdirs import user_cache_path
 
 from semsig_gis.core import InputError
-from semsig_gis.sources.clip import clip_layer, names_place, parse_area
+from semsig_gis.sources.area_file import names_place
+from semsig_gis.sources.clip import clip_layer, parse_area
 from semsig_gis.sources.http.access_token import AccessToken
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec

@@ -182,6 +182,20 @@ def test_file_without_crs_is_in_degrees(tmp_path: Path) -> None:
     assert parse_area(unstated(tmp_path, shapely.box(*BOX))).bounds == BOX
 
 
+def test_area_may_be_a_closed_line_and_the_only_layer_of_polygons(tmp_path: Path) -> None:
+    places = write(tmp_path, shapely.Point(3.85, 43.6))
+    line = shapely.LineString(shapely.box(*BOX).exterior.coords)
+    outline = gpd.GeoDataFrame(geometry=[line], crs="EPSG:4326")
+    outline.to_file(tmp_path / "outline.gpkg")
+    assert parse_area(str(tmp_path / "outline.gpkg")).bounds == BOX
+    square = gpd.GeoDataFrame(geometry=[shapely.box(*BOX)], crs="EPSG:4326")
+    square.to_file(places, layer="square")
+    assert parse_area(places).bounds == BOX
+    square.to_file(places, layer="other")
+    with refused(InputError, "2 layers of polygons", "ogr2ogr area.gpkg quarter.gpkg square"):
+        parse_area(places)
+
+
 RING = """
 1
    {0} {1}
