@@ -36,6 +36,7 @@ class LeftOut(TypedDict):
     pictures: dict[str, str]
     below_min_score: int
     no_boxes: int
+    faulty_boxes: int
     no_street_objects: dict[str, int]
     unknown_labels: dict[str, int]
     classes_not_in_city: dict[str, int]
@@ -72,9 +73,10 @@ class Views:
     files: Annotated[
         list[Path],
         Option(
-            "Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary or "
-            "Panoramax JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of "
-            "Roboflow; or a folder. With --detector: photographs, or folders of them.",
+            "Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, Datumaro, BDD100K, "
+            "Mapillary, Panoramax, Ultralytics or Transformers JSON, CVAT or Pascal VOC XML, YOLO "
+            ".txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: "
+            "photographs, or folders of them.",
             positional=True,
             reads=True,
         ),
@@ -319,6 +321,11 @@ def _notes(unknown: list[str], tally: Tally) -> Iterator[str]:
         yield f"not opened, as all is known without: {pictures}: {reason}"
     if tally.below_min_score:
         yield f"left out: {_many(tally.below_min_score, 'box', 'boxes')} below --min-score"
+    if tally.turned:
+        pictures = _many(len(tally.turned), "picture")
+        yield f"the boxes of {pictures} are turned as its camera was, because they are not upright"
+    if tally.faulty:
+        yield f"left out: {_many(len(tally.faulty), 'box', 'boxes')}: {tally.faulty[0]}"
     if tally.no_boxes:
         shapes = _many(tally.no_boxes, "shape")
         yield f"left out: {shapes} without a box or an outline of one object"

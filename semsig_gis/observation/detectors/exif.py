@@ -44,6 +44,7 @@ UNREADABLE = (
 )
 CLOCK_NUMBERS = 3  # hours, minutes and seconds
 SIDEWAYS = frozenset({5, 6, 7, 8})  # orientations that exchange width and height
+TURNS = {6: 90, 8: 270}  # degrees clockwise of orientations that are not mirrored
 # The focal length of a picture that is longer is that of the parts it was joined from.
 LONGEST_SIDES = 2.5
 
@@ -155,7 +156,8 @@ def _shot_of(image: Image.Image) -> Shot:
     exif = image.getexif()
     tags, gps = exif.get_ifd(IFD.Exif), exif.get_ifd(IFD.GPSInfo)
     # The size of a TIFF is that of the upright picture already.
-    sideways = exif.get(Base.Orientation) in SIDEWAYS and image.format != "TIFF"
+    orientation = exif.get(Base.Orientation)
+    sideways = orientation in SIDEWAYS and image.format != "TIFF"
     panorama = _panorama(image)
     heading, north = _direction(gps, GPS.GPSImgDirection, GPS.GPSImgDirectionRef)
     travels = heading is None and _number(gps.get(GPS.GPSSpeed)) != 0  # otherwise at rest
@@ -170,6 +172,7 @@ def _shot_of(image: Image.Image) -> Shot:
         travels=travels,
         position=_position(gps),
         time=_time(tags, gps),
+        turn=TURNS.get(orientation or 0) if sideways else None,
     )
     return camera if panorama is None else panorama.filled(camera)
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.camera import MOST_PIXELS
+from semsig_gis.observation.detectors.documents import INVALID
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 Corners = tuple[float, float, float, float]
 """Left, top, right and bottom."""
+NO_CORNERS: Corners = (math.nan, math.nan, math.nan, math.nan)
 
 FOLDERS = {"labels": "images", "label_2": "image_2", "ann": "img", "Annotations": "JPEGImages"}
 """Folders of pictures of data sets, by the folder of their labels."""
@@ -33,13 +34,15 @@ ROBOFLOW = re.compile(r"(?i)(.+)_(jpe?g|png|webp|tiff?)\.rf\.\w+(\.\w+)?")
 class Box:
     """An object in a picture: its label, its corners, and the score of the detector.
 
-    `whole` is false if a part of the object is marked as hidden.
+    `whole` is false if a part of the object is marked as hidden. `fault` says why the box cannot be
+    used; it is empty if it can.
     """
 
     label: str
     corners: Corners
     score: float = 1.0
     whole: bool = True
+    fault: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,8 +52,9 @@ class Shot:
     `focal` is the focal length divided by the longer side of the picture, `position` latitude and
     longitude, `time` in ISO 8601 with a time zone, and `north` the name of the north of the
     heading; `travels` is whether the heading is only the direction of travel. `horizon` is the row
-    of the horizon of a cropped panorama, as a share of its height. Pictures with the same `place`
-    are one view.
+    of the horizon of a cropped panorama, as a share of its height. `turn` is the angle in degrees
+    by which the pixels of a file are turned clockwise to show it upright. Pictures with the same
+    `place` are one view.
     """
 
     camera: Projection | None = None
@@ -67,6 +71,7 @@ class Shot:
     position: tuple[float, float] | None = None
     time: str | None = None
     place: str | None = None
+    turn: int | None = None
 
     def filled(self, other: Shot) -> Shot:
         """Return a copy with unknown values taken from another.
@@ -124,23 +129,26 @@ class AnnotatedPicture:
 def box_of(
     label: object, corners: Iterable[Any], where: str, *, score: object = None, whole: bool = True
 ) -> Box:
-    """Return a box; InputError with the place `where` if it is invalid."""
+    """Return a box, with a fault that names the place `where` if it is invalid."""
     try:
         left, top, right, bottom = (float(corner) for corner in corners)
         value = 1.0 if score is None else float(str(score))
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"{where} has a box or a score that is not a number; correct it or take it out."
-        ) from error
+    except INVALID:
+        left = top = right = bottom = value = math.nan
     numbers = left, top, right, bottom
-    in_range = all(abs(number) <= MOST_PIXELS for number in numbers)  # false for NaN
+    if any(map(math.isnan, (*numbers, value))):
+        return faulty_box(f"{where} has a box or a score that is not a number")
+    in_range = all(abs(number) <= MOST_PIXELS for number in numbers)
     if not in_range or right < left or bottom < top:
-        raise InputError(
-            f"{where} has the box {numbers}; give four numbers, none of its sides below 0."
-        )
+        return faulty_box(f"{where} has the box {numbers}, not four numbers with no side below 0")
     if not 0 <= value <= 1:
-        raise InputError(f"{where} has the score {value:g}; give a number from 0 to 1.")
+        return faulty_box(f"{where} has the score {value:g}, not a number from 0 to 1")
     return Box(label=str(label), corners=numbers, score=value, whole=whole)
+
+
+def faulty_box(fault: str) -> Box:
+    """Return a box that cannot be used."""
+    return Box(label="", corners=(0.0, 0.0, 0.0, 0.0), fault=fault)
 
 
 def same_shape(first: tuple[float, float], second: tuple[float, float]) -> bool:
@@ -155,9 +163,21 @@ def size_of(width: Any, height: Any) -> tuple[int, int] | None:  # noqa: ANN401 
 
 
 def bounds(points: Iterable[Iterable[Any]]) -> Corners:
-    """Return the corners of the bounding box of points (column, row)."""
-    columns, rows = zip(*((float(x), float(y)) for x, y in points), strict=True)
+    """Return the corners of the box around points (column, row); NaN if they are not points."""
+    try:
+        columns, rows = zip(*((float(x), float(y)) for x, y in points), strict=True)
+    except INVALID:
+        return NO_CORNERS
     return min(columns), min(rows), max(columns), max(rows)
+
+
+def upright(corners: Corners, turn: int, size: tuple[int, int]) -> Corners:
+    """Return a box of a picture of a size in the picture that is turned by 90 or 270 degrees."""
+    left, top, right, bottom = corners
+    wide, high = size
+    if turn == 90:  # noqa: PLR2004 - degrees clockwise
+        return high - bottom, left, high - top, right
+    return top, wide - right, bottom, wide - left
 
 
 def turned(corners: Corners, degrees: float, about: tuple[float, float]) -> Corners:

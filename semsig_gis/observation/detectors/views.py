@@ -22,7 +22,7 @@ from semsig_gis.core import (
 )
 from semsig_gis.observation.detectors.camera import USUAL_FOV, Camera, Projection
 from semsig_gis.observation.detectors.exif import PANORAMAS, read_exif
-from semsig_gis.observation.detectors.pictures import Shot, same_shape
+from semsig_gis.observation.detectors.pictures import Shot, same_shape, upright
 from semsig_gis.observation.view import (
     CLASSES,
     LEAST_RANGE_ERROR,
@@ -71,6 +71,10 @@ class Tally:
     ranges: int = 0
     below_min_score: int = 0
     no_boxes: int = 0
+    faulty: list[str] = field(default_factory=list)
+    """Why boxes cannot be used."""
+    turned: set[str] = field(default_factory=set)
+    """Pictures with boxes that were turned with the picture."""
     no_objects: Counter[str] = field(default_factory=Counter)
     unknown: Counter[str] = field(default_factory=Counter)
     not_in_city: Counter[str] = field(default_factory=Counter)
@@ -97,6 +101,7 @@ class Tally:
                 "pictures": dict(self.unusable),
                 "below_min_score": self.below_min_score,
                 "no_boxes": self.no_boxes,
+                "faulty_boxes": len(self.faulty),
                 "no_street_objects": dict(self.no_objects),
                 "unknown_labels": dict(self.unknown),
                 "classes_not_in_city": dict(self.not_in_city),
@@ -210,6 +215,11 @@ class ViewBuilder:
                 names[key] = picture.name if shot.place is None else shot.place
                 tally.times |= {} if shot.time is None else {names[key]: shot.time}
             groups.setdefault(key, []).append(view)
+        if tally.no_boxes and not any(picture.boxes for picture in pictures):
+            raise InputError(
+                f"none of the {tally.no_boxes:,} shapes is a box or an outline of one object, only "
+                "points, lines or groups; mark each object with a box or an outline."
+            )
         views = [
             (names[key], parts[0] if len(parts) == 1 else View.joined(parts).turned(0.0))
             for key, parts in groups.items()
@@ -235,13 +245,17 @@ class ViewBuilder:
                 tally.unread[picture.name] = str(error)
                 exif = Shot()
             if shot.size and exif.size and not same_shape(shot.size, exif.size):
+                if exif.turn and same_shape(shot.size, exif.size[::-1]):
+                    # The boxes are those of a program that does not turn the picture.
+                    tally.turned.add(picture.name)
+                    return replace(shot, size=shot.size[::-1]).filled(exif)
                 boxes, upright = (f"{wide} x {high}" for wide, high in (shot.size, exif.size))
                 raise InputError(
                     f"the boxes of {picture.name} are in a picture of {boxes} pixels, but {file} "
                     f"is {upright} as it is shown; detect the objects again in this file, or give "
                     "the picture that was used."
                 )
-            shot = shot.filled(exif)
+            shot = shot.filled(replace(exif, turn=None))
         return shot.filled(Shot(size=self.shot.size))
 
     def _file(self, picture: AnnotatedPicture) -> Path | None:
@@ -298,7 +312,11 @@ class ViewBuilder:
         camera = self._camera(picture, shot)
         boxes = [(box, meaning) for box in picture.boxes if (meaning := self._meaning(box, tally))]
         scale = np.array([camera.width, camera.height] * 2, dtype=float)
-        corners = np.array([box.corners for box, _ in boxes], dtype=float).reshape(-1, 4)
+        sides = [box.corners for box, _ in boxes]
+        if shot.turn:
+            size = (1, 1) if picture.shares else (camera.height, camera.width)
+            sides = [upright(corners, shot.turn, size) for corners in sides]
+        corners = np.array(sides, dtype=float).reshape(-1, 4)
         corners = np.clip(corners * (scale if picture.shares else 1.0), 0.0, scale)
         # The probability of each class, the rest is any class; the height and its deviation.
         scores = np.zeros((len(boxes), CLASSES))
@@ -363,6 +381,9 @@ class ViewBuilder:
 
     def _meaning(self, box: Box, tally: Tally) -> Meaning | None:
         """Return the meaning of a box, or count it and return None if it is left out."""
+        if box.fault:
+            tally.faulty.append(box.fault)
+            return None
         if box.score < self.min_score:
             tally.below_min_score += 1
             return None

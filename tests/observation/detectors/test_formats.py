@@ -279,8 +279,50 @@ POLYGONS = [
     for item in COCO["annotations"]
     for x, y, width, height in [item["bbox"]]
 ]
+
+
+def run_lengths(x: int, y: int, width: int, height: int) -> list[int]:
+    """Return the mask of a rectangle in a picture of 400 rows, column by column."""
+    return [400 * x + y, *[height, 400 - height] * (width - 1), height, 9]
+
+
+def as_text(runs: list[int]) -> str:
+    """Return run lengths as COCO compresses them."""
+    text = ""
+    for number, run in enumerate(runs):
+        value = run - runs[number - 2] if number > 2 else run
+        while True:
+            bits, value = value & 31, value >> 5
+            last = value == (-1 if bits & 16 else 0)
+            text += chr(48 + (bits if last else bits | 32))
+            if last:
+                break
+    return text
+
+
+MASKS = [
+    {**item, "bbox": None, "segmentation": {"size": [400, 800], "counts": counts}}
+    for item, form in zip(COCO["annotations"], (list, as_text), strict=True)
+    for counts in [form(run_lengths(*item["bbox"]))]
+]
+SMALL_TASK = {
+    "id": 3,
+    "image": "/data/upload/1/0a1b2c3d-street.jpg",
+    "annotator": 1,
+    "label": [
+        {
+            "original_width": 800,
+            "original_height": 400,
+            item["type"]: [],
+            **item["value"],
+            "score": item.get("score", 1.0),
+        }
+        for item in TASK["predictions"][0]["result"]
+    ],
+}
 SAMPLES = {
     "COCO": {"street.json": json.dumps(COCO)},
+    "COCO (masks)": {"street.json": json.dumps({**COCO, "annotations": MASKS})},
     "COCO (polygons)": {"street.json": json.dumps({**COCO, "annotations": POLYGONS})},
     "COCO (results)": {
         "results.json": json.dumps([{"score": 1.0, **item} for item in COCO["annotations"]]),
@@ -328,6 +370,97 @@ SAMPLES = {
             }
         )
     },
+    "Label Studio (JSON-MIN)": {"tasks.json": json.dumps([SMALL_TASK])},
+    "Datumaro": {
+        "default.json": json.dumps(
+            {
+                "info": {},
+                "categories": {"label": {"labels": [{"name": name} for name in LABELS]}},
+                "items": [
+                    {
+                        "id": "street",
+                        "image": {"path": "street.jpg", "size": [400, 800]},
+                        "annotations": [
+                            {
+                                "type": "bbox",
+                                "label_id": 0,
+                                "bbox": [80, 100, 160, 100],
+                                "attributes": {"occluded": False},
+                            },
+                            {
+                                "type": "polygon",
+                                "label_id": 1,
+                                "points": [400, 40, 440, 50, 410, 80],
+                                "attributes": {"score": 0.75, "occluded": True},
+                            },
+                            {"type": "points", "label_id": 1, "points": [1, 2]},
+                        ],
+                    }
+                ],
+            }
+        )
+    },
+    "Datumaro (masks)": {
+        "default.json": json.dumps(
+            {
+                "info": {},
+                "categories": {"label": {"labels": [{"name": name} for name in LABELS]}},
+                "items": [
+                    {
+                        "id": "street",
+                        "image": {"path": "street.jpg", "size": [400, 800]},
+                        "annotations": [
+                            {
+                                "type": "mask",
+                                "label_id": number,
+                                "rle": mask["segmentation"],
+                                "attributes": {
+                                    "score": mask.get("score", 1.0),
+                                    "truncated": number,
+                                },
+                            }
+                            for number, mask in enumerate(MASKS)
+                        ]
+                        + [{"type": "caption", "caption": "street"}],
+                    }
+                ],
+            }
+        )
+    },
+    "results of Ultralytics or Transformers": {
+        "street.json": json.dumps(
+            [
+                {
+                    "name": "bench",
+                    "class": 0,
+                    "confidence": 1.0,
+                    "box": {"x1": 80, "y1": 100, "x2": 240, "y2": 200},
+                },
+                {
+                    "name": "stop sign",
+                    "class": 1,
+                    "confidence": 0.75,
+                    "box": {"x1": 400, "y1": 40, "x2": 440, "y2": 80},
+                },
+            ]
+        )
+    },
+    "results of Ultralytics or Transformers (of Transformers, in shares)": {
+        "street.json": json.dumps(
+            [
+                {
+                    "label": "bench",
+                    "score": 1.0,
+                    "box": {"xmin": 0.1, "ymin": 0.25, "xmax": 0.3, "ymax": 0.5},
+                },
+                {
+                    "label": "stop sign",
+                    "score": 0.75,
+                    "box": {"xmin": 0.5, "ymin": 0.1, "xmax": 0.55, "ymax": 0.2},
+                },
+            ]
+        )
+    },
     "Panoramax": {"item.json": json.dumps(ITEM)},
     "Panoramax (search)": {
         "items.json": json.dumps({"type": "FeatureCollection", "features": [ITEM]})
@@ -335,8 +468,8 @@ SAMPLES = {
 }
 # Formats without scores, without sizes, with marks of hidden objects, and with other shapes.
 NO_SCORES = ("Mapillary", "VIA", "CSV")
-NO_SIZES = ("YOLO", "KITTI", "VIA")
-WITH_HIDDEN = ("CVAT", "Pascal", "Supervisely", "KITTI", "BDD100K")
+NO_SIZES = ("YOLO", "KITTI", "VIA", "results")
+WITH_HIDDEN = ("CVAT", "Datumaro", "Pascal", "Supervisely", "KITTI", "BDD100K")
 WITH_OTHERS = ("Label", *WITH_HIDDEN, "VIA", "Panoramax")
 OWN_LABELS = {"KITTI": ["bench", "stop_sign"], "Panor": ["amenity=bench", "traffic_sign=stop"]}
 
@@ -657,9 +790,9 @@ def annotation(**values: object) -> str:
         ("a.json", "{}", "contains no detections in a known format; give BDD100K, COCO, CVAT"),
         ("a.json", "[1]", "contains no detections"),
         ("a.json", json.dumps(COCO["annotations"]), "without images and categories"),
-        ("a.json", annotation(bbox=[1, 2, 3]), "does not follow its format"),
-        ("a.json", annotation(bbox=[1, 2, "x", 4]), "does not follow its format"),
-        ("a.json", annotation(bbox=[1, 2, None, 4]), "does not follow its format"),
+        ("a.json", annotation(bbox=[1, 2, 3]), "annotation 1 has a box or a score"),
+        ("a.json", annotation(bbox=[1, 2, "x", 4]), "annotation 1 has a box or a score"),
+        ("a.json", annotation(bbox=[1, 2, None, 4]), "annotation 1 has a box or a score"),
         ("a.json", annotation(bbox=[1, 2, -3, 4]), "annotation 1 has the box (1.0, 2.0, -2.0"),
         ("a.json", annotation(bbox=[1, 2, 1e999, 4]), "annotation 1 has the box"),
         ("a.json", annotation(score=7), "annotation 1 has the score 7"),
@@ -688,7 +821,7 @@ def annotation(**values: object) -> str:
         ("a.json", json.dumps({**LABELME, "shapes": [{"label": "x"}]}),
          "does not follow its format, LabelMe (it lacks 'points')"),
         ("a.json", json.dumps({**LABELME, "shapes": [{"label": "x", "points": []}]}),
-         "does not follow its format, LabelMe"),
+         "shape 1 has a box or a score that is not a number"),
         ("a.json", json.dumps({"a": {"filename": "a", "regions": [{}]}}),
          "does not follow its format, VIA (it lacks 'shape_attributes')"),
         ("a.json", json.dumps({**SUPERVISELY, "size": {"width": 9}}), "lacks 'height'"),
@@ -707,15 +840,23 @@ def annotation(**values: object) -> str:
         ("a.xml", "<!DOCTYPE a><a/>", "its own document type"),
         ("a.xml", "<annotations><track/></annotations>", "contains tracks of a video"),
         ("a.xml", CVAT.replace(' name="street.jpg"', ""), "lacks 'name'"),
-        ("a.xml", CVAT.replace('"400,40;440', '"400;440'), "does not follow its format"),
+        ("a.xml", CVAT.replace('"400,40;440', '"400;440'), "shape 2 has a box or a score"),
         ("a.png", "", "is not in a supported format"),
     ],
 )  # fmt: skip
-def test_what_is_no_such_file_is_refused(name: str, text: str, words: str, tmp_path: Path) -> None:
+def test_invalid_file_is_refused_and_single_invalid_box_has_a_fault(
+    name: str, text: str, words: str, tmp_path: Path
+) -> None:
     (tmp_path / "classes.txt").write_text("bench\n")
     (tmp_path / name).write_text(text)
-    with refused(InputError, name, words):
-        read_pictures([tmp_path / name])
+    try:
+        pictures, _ = read_pictures([tmp_path / name])
+    except InputError as error:
+        assert_sentence(error, name, words)
+    else:
+        boxes = [box for picture in pictures for box in picture.boxes]
+        (fault,) = (box.fault for box in boxes if box.fault)
+        assert (len(boxes) > 1, name in fault, words in fault) == (True, True, True)
 
 
 @pytest.mark.parametrize(

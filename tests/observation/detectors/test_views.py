@@ -127,6 +127,7 @@ def test_ignored_boxes_are_counted() -> None:
             "pictures": {},
             "below_min_score": 1,
             "no_boxes": 2,
+            "faulty_boxes": 0,
             "no_street_objects": {"person": 1},
             "unknown_labels": {"lion": 2},
             "classes_not_in_city": {"fire hydrant": 1},

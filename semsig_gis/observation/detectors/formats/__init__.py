@@ -59,12 +59,13 @@ def read_pictures(
 ) -> tuple[list[AnnotatedPicture], list[Path]]:
     """Read pictures and boxes from files of detections; the format is found by the content.
 
-    A folder means the files of all formats in it and in its folders. YOLO labels need a file of
-    class names (.yaml, .names, classes.txt) among the files, in the same folder or up to two above.
-    COCO results need a file of images and categories among the files.
+    A folder means the files of all formats in it and in its folders, a file of class names without
+    labels (.yaml, .names, classes.txt) its folder. YOLO labels need such a file among the files, in
+    the same folder or up to two above. COCO results need a file of images and categories among the
+    files. A box that cannot be used has a `fault`.
 
     Returns the pictures, and the files of folders that are in no format. InputError if a file
-    cannot be read or has another format.
+    cannot be read or has another format, or no box can be used.
     """
     documents: list[Document] = []
     unknown: list[Path] = []
@@ -85,7 +86,17 @@ def read_pictures(
         else:
             raise InputError(f"{path} is not in a supported format; {_accepted()}.")
     labels = [document for document in documents if not _has_class_names(document.file)]
-    return [picture for document in labels for picture in _pictures(document, documents)], unknown
+    if documents and not labels:  # only names of classes: the labels are in folders next to them
+        files = {file for document in documents for file in _files_in(document.file.parent)}
+        labels = [item for item in map(read_document, sorted(files)) if _format(item)]
+        if not labels:
+            names = documents[0].file
+            raise InputError(f"{names} has names of classes, and no labels; {_accepted()}.")
+    pictures = [picture for document in labels for picture in _pictures(document, documents)]
+    boxes = [box for picture in pictures for box in picture.boxes]
+    if boxes and all(box.fault for box in boxes):
+        raise InputError(f"{boxes[0].fault}; correct the file, or export it again.")
+    return pictures, unknown
 
 
 def _accepted() -> str:

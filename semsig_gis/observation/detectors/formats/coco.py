@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from semsig_gis.core import InputError
+from semsig_gis.observation.detectors.documents import INVALID
 from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
+    NO_CORNERS,
     AnnotatedPicture,
     Shot,
     bounds,
     box_of,
+    faulty_box,
     size_of,
 )
 
@@ -64,19 +69,29 @@ def _pictures(
     names = {item["id"]: item["name"] for item in content["categories"]}
     boxes: dict[Any, list[Box]] = {item["id"]: [] for item in content["images"]}
     others = dict.fromkeys(boxes, 0)
+    unlisted = []
     for number, item in enumerate(annotations, start=1):
         where = f"{source}, annotation {number}"
         image, category = item["image_id"], item["category_id"]
         if image not in boxes or category not in names:
             what = f"image {image!r}" if image not in boxes else f"category {category!r}"
-            raise InputError(
-                f"{where} is of the {what}, which is not listed; give the file that lists it."
-            )
-        corners = _corners(item)
-        if corners is None:
+            unlisted.append(faulty_box(f"{where} is of the {what}, which is not listed"))
+            continue
+        if item.get("iscrowd"):  # several objects
             others[image] += 1
             continue
-        boxes[image].append(box_of(names[category], corners, where, score=item.get("score")))
+        try:
+            corners = _corners(item)
+        except INVALID:
+            corners = NO_CORNERS
+        if corners is None:
+            others[image] += 1
+        else:
+            boxes[image].append(box_of(names[category], corners, where, score=item.get("score")))
+    if unlisted and (len(unlisted) == len(annotations) or not boxes):
+        raise InputError(f"{unlisted[0].fault}; give the file that lists it.")
+    if boxes:
+        next(iter(boxes.values())).extend(unlisted)
     return [
         AnnotatedPicture(
             name=str(item.get("file_name", item["id"])),
@@ -89,13 +104,56 @@ def _pictures(
 
 
 def _corners(item: dict[str, Any]) -> Corners | None:
-    """Return the box of an annotation, or the box of all its polygons; None without both."""
-    if item.get("iscrowd"):  # several objects
-        return None
+    """Return the box of an annotation, or the box of its outline or mask; None without them."""
     if item.get("bbox"):
         left, top, width, height = item["bbox"]
         return left, top, left + width, top + height
-    parts = item.get("segmentation")
-    if not parts or not isinstance(parts, list):  # none, or a compressed mask
+    shape = item.get("segmentation")
+    if isinstance(shape, dict):
+        return mask_corners(shape)
+    if not shape:
         return None
+    parts = shape if isinstance(shape[0], list) else [shape]
     return bounds(point for part in parts for point in zip(part[::2], part[1::2], strict=True))
+
+
+def mask_corners(mask: dict[str, Any]) -> Corners | None:
+    """Return the box of a mask in run lengths; None if it is empty.
+
+    The mask is read column by column: `counts` are the numbers of pixels that are alternately out
+    of the object and in it, or these numbers as text.
+    """
+    high, counts = int(mask["size"][0]), mask["counts"]
+    if high < 1:
+        raise ValueError("a mask has no rows")
+    runs = _run_lengths(counts) if isinstance(counts, str) else map(int, counts)
+    ends = np.cumsum(np.array([*runs], np.int64))
+    first, last = ends[:-1:2], ends[1::2] - 1
+    first, last = first[first <= last], last[first <= last]
+    if not len(first):
+        return None
+    one_column = first // high == last // high
+    top = np.where(one_column, first % high, 0).min()
+    bottom = np.where(one_column, last % high, high - 1).max() + 1
+    return float(first[0] // high), float(top), float(last[-1] // high + 1), float(bottom)
+
+
+def _run_lengths(text: str) -> list[int]:
+    """Return the run lengths in a text of COCO.
+
+    A character has five bits of a number, lowest first, and whether others follow. From the fourth
+    number on, they are differences from the second last one.
+    """
+    runs: list[int] = []
+    value = shift = 0
+    for character in text:
+        code = ord(character) - 48
+        value |= (code & 31) << shift
+        shift += 5
+        if code & 32:
+            continue
+        if code & 16:  # the number is negative
+            value -= 1 << shift
+        runs.append(value + (runs[-2] if len(runs) > 2 else 0))  # noqa: PLR2004
+        value = shift = 0
+    return runs

@@ -26,19 +26,46 @@ if TYPE_CHECKING:
 PERCENT = 100.0
 
 
+SHAPES = ("rectanglelabels", "polygonlabels")
+
+
 def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
-    """Return whether JSON is a list of tasks."""
+    """Return whether JSON is a list of tasks, whole or as JSON-MIN."""
     return (
         isinstance(content, list)
         and bool(content)
-        and all(isinstance(item, dict) and "data" in item for item in content)
+        and all(isinstance(item, dict) and ("data" in item or _shapes(item)) for item in content)
     )
+
+
+def _shapes(task: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the shapes of a task in JSON-MIN, which stand under a name that the user chooses."""
+    return [
+        item
+        for values in task.values()
+        if isinstance(values, list)
+        for item in values
+        if isinstance(item, dict) and "original_width" in item
+    ]
 
 
 @detection_format("Label Studio", ".json", matches)
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture of each task."""
-    return [_picture(task, str(document.file)) for task in document.content]
+    tasks = (task if "data" in task else _whole_task(task) for task in document.content)
+    return [_picture(task, str(document.file)) for task in tasks]
+
+
+def _whole_task(task: dict[str, Any]) -> dict[str, Any]:
+    """Return a task of JSON-MIN in the form of whole tasks."""
+    texts = {name: value for name, value in task.items() if isinstance(value, str)}
+    result = [
+        {**shape, "type": kind, "value": shape}
+        for shape in _shapes(task)
+        for kind in shape
+        if kind.endswith("labels")
+    ]
+    return {"id": task.get("id", "?"), "data": texts, "annotations": [{"result": result}]}
 
 
 def _picture(task: dict[str, Any], source: str) -> AnnotatedPicture:
@@ -50,7 +77,7 @@ def _picture(task: dict[str, Any], source: str) -> AnnotatedPicture:
     for item in last["result"]:
         kind, value = str(item.get("type", "")), item.get("value", {})
         size = size_of(item.get("original_width"), item.get("original_height")) or size
-        if kind not in {"rectanglelabels", "polygonlabels"}:
+        if kind not in SHAPES:
             others += kind.endswith("labels")
             continue
         label = value[kind][0] if value.get(kind) else "no label"

@@ -9,15 +9,20 @@ import yaml
 from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.documents import INVALID, text_of
 from semsig_gis.observation.detectors.formats import detection_format
-from semsig_gis.observation.detectors.pictures import AnnotatedPicture, bounds, box_of
+from semsig_gis.observation.detectors.pictures import (
+    AnnotatedPicture,
+    bounds,
+    box_of,
+    faulty_box,
+)
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
     from semsig_gis.observation.detectors.documents import Document
-    from semsig_gis.observation.detectors.pictures import Corners
+    from semsig_gis.observation.detectors.pictures import Box, Corners
 
 NAME_FILES = ("data.yaml", "data.yml", "classes.txt", "obj.names")
 """Files with class names, in the folder of the labels or up to two above."""
@@ -37,6 +42,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
     return (
         len(words) >= LEAST_WORDS
         and not words[0].endswith(":")
+        and "." not in words[0]
         and all(word.lstrip("-").replace(".", "", 1).isdecimal() for word in (words[1], words[-1]))
     )
 
@@ -50,19 +56,25 @@ def pictures(document: Document, documents: Sequence[Document]) -> list[Annotate
     for number, words in enumerate(document.content, start=1):
         if not words:
             continue
-        where = f"{file}, line {number}"
-        if len(words) <= BOX_VALUES or not words[0].isdecimal():
-            raise InputError(
-                f"{where} is not a line of YOLO labels; write class, x, y, width, height (and "
-                "score)."
-            )
-        if int(words[0]) not in labels:
-            raise InputError(
-                f"{where} is of class {words[0]}, which has no name; list it in data.yaml."
-            )
-        corners, score = _corners(words[1:], where)
-        boxes.append(box_of(labels[int(words[0])], corners, where, score=score))
+        try:
+            boxes.append(_box(words, labels, f"{file}, line {number}"))
+        except InputError as error:
+            boxes.append(faulty_box(str(error).rstrip(".")))
     return [AnnotatedPicture(name=file.stem, boxes=tuple(boxes), shares=True)]
+
+
+def _box(words: Sequence[str], labels: Mapping[int, str], where: str) -> Box:
+    """Return the box of a line; InputError if it has none."""
+    if len(words) <= BOX_VALUES or not words[0].isdecimal():
+        raise InputError(
+            f"{where} is not a line of YOLO labels; write class, x, y, width, height (and score)."
+        )
+    if int(words[0]) not in labels:
+        raise InputError(
+            f"{where} is of class {words[0]}, which has no name; list it in data.yaml."
+        )
+    corners, score = _corners(words[1:], where)
+    return box_of(labels[int(words[0])], corners, where, score=score)
 
 
 def _corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None]:
