@@ -283,12 +283,12 @@ def _crs(
     CrsError if it is unknown; `crs` is that of a file that does not state one.
     """
     stated = sample.info.crs
-    if sample.reader != VECTOR and (positions is None or stated is not None):
-        return None, ""  # degrees, by the rules of these formats, or what the file states
     if stated is not None:
-        return stated, ""
+        return (stated if sample.reader == VECTOR else None), ""
     if crs is not None:
         return crs, ""
+    if sample.reader != VECTOR and positions is None:
+        return None, ""  # degrees, by the rules of these formats
     if positions is not None and positions.crs is not None:
         return positions.crs, "the file does not say; its coordinates are in the range of this one"
     # Read the coordinates in any CRS, to see whether they can be degrees.
