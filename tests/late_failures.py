@@ -27,8 +27,8 @@ def failures(
 ) -> Iterator[Callable[[Callable[[], Any]], InputError | None]]:
     """Yield functions that run a block while some of its system calls from the n-th on fail.
 
-    n goes from the first call to the last in steps of `every`, and `calls` fail. Each function returns the error of the
-    block, if it is an `InputError`. The last block runs without a failure.
+    n goes from the first call to the last in steps of `every`, and `calls` fail. Each function
+    returns the error of the block, if it is an `InputError`. The last block runs without a failure.
     """
     for number in range(0, MOST_CALLS, every):
         system = _FailingSystem(number, calls)

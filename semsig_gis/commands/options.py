@@ -16,6 +16,7 @@ from semsig_gis.core import (
     DatabaseError,
     EmptyResultError,
     InputError,
+    percent,
 )
 from semsig_gis.localization import METRICS
 
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from semsig_gis.observation import North, View
 
 EXPLAINED = 3  # candidates
+LEAST_SEEN = 0.5  # of what cells see, among the street objects of the database
 MOST_TOP = 10_000
 # The same limits as in `core` and the specs, which are slow to import.
 MOST_SEED, MOST_METRES, MOST_WORKERS, MOST_QUERIES = 10**18, 1_000_000, 1024, 10_000_000
@@ -520,7 +522,11 @@ class SearchOptions:
         )
         log_prior, knowledge = self._prior(city.database, reporter)
         needed = bool(self.refine)
-        store = object_store(city, self.objects, reporter, needed=needed) if needs_objects else None
+        store, notes = None, tuple[str, ...]()
+        if needs_objects:
+            store, notes = find_store(city, self.objects, needed=needed)
+            for note in notes:
+                reporter.remark(note)
         return make_locator(
             city,
             method,
@@ -532,6 +538,7 @@ class SearchOptions:
             explained=EXPLAINED if explain else 0,
             known=knowledge,
             north=north or GRID_NORTH,
+            notes=notes,
         )
 
     def _prior(
@@ -640,7 +647,20 @@ def object_store(
     city: City, objects: Path | None, reporter: Reporter, *, needed: bool
 ) -> ObjectStore | None:
     """Return the street objects of a database; None with a remark if missing and not needed."""
-    from semsig_gis.database import ObjectStore, open_store
+    store, notes = find_store(city, objects, needed=needed)
+    for note in notes:
+        reporter.remark(note)
+    return store
+
+
+def find_store(
+    city: City, objects: Path | None, *, needed: bool
+) -> tuple[ObjectStore | None, tuple[str, ...]]:
+    """Return the street objects of a database, None if missing and not needed, and notes on them.
+
+    DatabaseError if they are needed.
+    """
+    from semsig_gis.database import ObjectStore, open_store, share_seen
 
     if objects is not None and not objects.is_dir():
         from semsig_gis.objects import open_objects
@@ -651,14 +671,17 @@ def object_store(
                 f"{objects} is in {store.objects.crs.to_string()} and the database in "
                 f"{city.database.crs.to_string()}; give the objects that it was built from."
             )
-        return store
+        share = share_seen(city.database, store.objects)
+        if share >= LEAST_SEEN:
+            return store, ()
+        other = f"only {percent(share, 0)} of what cells of {city.path} see is in {objects}"
+        return store, (f"{other}, so it has other street objects than those of the database.",)
     try:
-        return city.store if objects is None else open_store(city.path, objects)
+        return (city.store if objects is None else open_store(city.path, objects)), ()
     except DatabaseError as error:
         if needed or objects is not None:
             raise
-        reporter.remark(f"no street objects found; answering at cell precision: {error}")
-        return None
+        return None, (f"no street objects found; answering at cell precision: {error}",)
 
 
 def north_sigma(heading: str) -> float:

@@ -1,5 +1,6 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
+from .agreement import share_seen as share_seen
 from .cells import build as build
 from .cells import build_cells as build_cells
 from .cells import build_database as build_database

@@ -307,7 +307,7 @@ class City(Displayed):
                 new = partial / file.name
                 _write_with_columns(file, new, columns, cell_ids, added)
                 parts.append(replace(part, bytes=new.stat().st_size, sha256=digest(new)))
-            Manifest(manifest.recipe, tuple(parts)).write(partial)
+            Manifest(manifest.recipe, tuple(parts), manifest.inputs).write(partial)
             if self.has_store:
                 shutil.copytree(self.store_path, partial / INPUTS)
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import zlib
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -359,11 +359,13 @@ class PartFile:
 class Manifest:
     """The contents of a signature database in parts, ordered by tile.
 
-    `recipe` has the specs and the digests of the inputs, as JSON values.
+    `recipe` has the specs and the digests of the inputs, as JSON values. `inputs` are the digests
+    of their copies by file name, empty in a database of an older version.
     """
 
     recipe: dict[str, Any]
     parts: tuple[PartFile, ...]
+    inputs: dict[str, str] = field(default_factory=dict)
 
     @property
     def cells(self) -> int:
@@ -380,6 +382,7 @@ class Manifest:
         content: dict[str, Any] = {
             "kind": PARTS_KIND,
             "recipe": self.recipe,
+            **({"inputs": self.inputs} if self.inputs else {}),
             "parts": [{"file": part.file, **asdict(part)} for part in self.parts],
         }
         content["sum"] = _checksum(content)
@@ -415,13 +418,14 @@ def read_manifest(folder: str | Path) -> Manifest:
             for part in content["parts"]
         )
         recipe = dict(content["recipe"])
+        inputs = {str(name): str(value) for name, value in content.get("inputs", {}).items()}
         kind = content["kind"]
     except (FileNotFoundError, NotADirectoryError) as error:
         raise DatabaseError(
             f"{folder} is not a signature database in parts (it has no {MANIFEST}); give a "
             "folder that `semsig build --tile` wrote."
         ) from error
-    except (OSError, ValueError, LookupError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise DatabaseError(
             f"{path} is damaged or cannot be read; build the database again."
         ) from error
@@ -430,7 +434,7 @@ def read_manifest(folder: str | Path) -> Manifest:
             f"{path} does not belong to a signature database; give a folder that `semsig build "
             "--tile` wrote."
         )
-    return Manifest(recipe, parts)
+    return Manifest(recipe, parts, inputs)
 
 
 def part_files(folder: str | Path) -> tuple[Path, ...]:

@@ -412,15 +412,38 @@ def _read(folder: Path, database: Path) -> ObjectStore:
     # Older stores have an R-tree too; it is not read, because a damaged one ends the program.
     names = [name for name in (OBJECTS, FOOTPRINTS, STREETS) if name in manifest["files"]]
     damaged = damaged_files(folder, {name: manifest["files"][name] for name in names})
+    # A file that the manifest does not list may be of another run.
+    damaged += [
+        name for name in (FOOTPRINTS, STREETS) if name not in names and (folder / name).exists()
+    ]
     if damaged or OBJECTS not in names:
         raise DatabaseError(
             f"{folder / min(damaged, default=OBJECTS)} is damaged; build the database again."
         )
+    specs = read_specs(database)
+    lacking = lacking_ground(
+        houses=FOOTPRINTS in names or specs.get("occlusion") is None,
+        lines=STREETS in names or dict(specs.get("viewpoints") or {}).get("mode") != "streets",
+    )
+    if lacking:
+        raise DatabaseError(f"{folder} {lacking}")
     return ObjectStore(
         objects=open_objects(folder / OBJECTS),
         footprints=_read_shapes(folder / FOOTPRINTS) if FOOTPRINTS in names else None,
         streets=_read_shapes(folder / STREETS) if STREETS in names else None,
     )
+
+
+def lacking_ground(*, houses: bool, lines: bool) -> str:
+    """Return the end of a message on the buildings and streets that a store lacks, if any.
+
+    `houses` and `lines` are whether they are there, or not needed.
+    """
+    lacking = [name for name, there in (("buildings", houses), ("streets", lines)) if not there]
+    if not lacking:
+        return ""
+    what = " and ".join(lacking)
+    return f"lacks the {what} that the database was built with; build the database again."
 
 
 def stored_inputs(folder: Path) -> dict[str, Path]:
@@ -438,7 +461,14 @@ def stored_inputs(folder: Path) -> dict[str, Path]:
 
 
 def _read_inputs(folder: Path) -> ObjectStore:
-    files = stored_inputs(folder)
+    files, manifest = stored_inputs(folder), read_manifest(folder)
+    changed = damaged_files(folder / INPUTS, manifest.inputs)
+    changed += [file.name for file in files.values() if file.name not in manifest.inputs]
+    if manifest.inputs and changed:
+        raise DatabaseError(
+            f"{folder / INPUTS / min(changed)} is not what the database was built from; build the "
+            "database again."
+        )
     objects = open_objects(files.pop("objects"))
     houses, lines = _read_ground(files, objects.crs)
     return ObjectStore.of(objects, footprints=houses, streets=lines)

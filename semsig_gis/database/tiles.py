@@ -590,7 +590,8 @@ def finished_tiles(folder: Path, tiles: Iterable[Tile]) -> dict[Tile, PartFile |
 
 def publish_tiles(folder: Path, parts: Sequence[PartFile]) -> Manifest:
     """Move a finished database to its final folder and replace it; parts are ordered by tile."""
-    manifest = Manifest(read_json(folder / RECIPE), tuple(parts))
+    inputs = {file.name: digest(file) for file in sorted((folder / INPUTS).glob("*.parquet"))}
+    manifest = Manifest(read_json(folder / RECIPE), tuple(parts), inputs)
     _require_replaceable(folder.with_name(folder.name.removesuffix(PARTIAL)))
     manifest.write(folder)
     names = {MANIFEST, RECIPE, INPUTS, *(part.file for part in manifest.parts)}

@@ -47,7 +47,7 @@ from semsig_gis.database.file import (
 )
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.database.sightings import measure_sightings
-from semsig_gis.database.store import save_with_store, stored_inputs
+from semsig_gis.database.store import lacking_ground, save_with_store, stored_inputs
 from semsig_gis.database.tile_inputs import working_folder
 from semsig_gis.database.tiles import (
     TileSpec,
@@ -262,16 +262,12 @@ def update_database(
     >>> report.recomputed
     0
     """
-    lacking = []
-    if store.footprints is None and database.occlusion is not None:
-        lacking.append("buildings")
-    if store.streets is None and database.viewpoints.mode == "streets":
-        lacking.append("streets")
+    lacking = lacking_ground(
+        houses=store.footprints is not None or database.occlusion is None,
+        lines=store.streets is not None or database.viewpoints.mode != "streets",
+    )
     if lacking:
-        raise DatabaseError(
-            f"the object store lacks the {' and '.join(lacking)} that the database was built with; "
-            "build the database again."
-        )
+        raise DatabaseError(f"the object store {lacking}")
     merged, other_layers, notes = replace_layers(store.objects, objects)
     streets = store.streets if database.viewpoints.mode == "streets" else None
     new = replace(

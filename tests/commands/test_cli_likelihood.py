@@ -8,6 +8,7 @@ import io
 import json
 import math
 import re
+import shutil
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -593,3 +594,18 @@ def test_objects_outside_the_photo_are_counted_separately(city: Path, run: Run) 
     outside = [row for row in rows if row["verdict"] == "outside"]
     assert f"{len(outside)} outside" in printed
     assert all(not 45.0 < row["object_bearing"] < 135.0 for row in outside)
+
+
+def test_answers_note_that_street_objects_are_missing_or_of_another_city(
+    town: Path, run: Run
+) -> None:
+    query = "localize city.parquet --types BD --bearings 20,200 -q --json"
+    assert json.loads(run(query)[1])["notes"] == []
+    save_objects(random_town(seed=99).street_objects, "other.parquet")
+    (note,) = json.loads(run(f"{query} --objects other.parquet")[1])["notes"]
+    assert "of what cells of city.parquet see is in other.parquet" in note
+    assert json.loads(run(f"{query} --objects objects.parquet")[1])["notes"] == []
+    shutil.rmtree(town / "city.objects")
+    (note,) = json.loads(run(query)[1])["notes"]
+    assert "answering at cell precision" in note
+    assert "build the database again" in note

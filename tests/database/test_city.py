@@ -35,10 +35,17 @@ from semsig_gis.database import (
     read_manifest,
     save_database,
     save_with_store,
+    share_seen,
     store_path,
 )
 from semsig_gis.database import store as store_module
-from semsig_gis.objects import ConflationReport, Loaded, LoadReport, open_objects
+from semsig_gis.objects import (
+    ConflationReport,
+    Loaded,
+    LoadReport,
+    open_objects,
+    save_objects,
+)
 from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
@@ -449,6 +456,50 @@ def test_damaged_store_manifests_are_refused(stored: Path, content: Any, words: 
         manifest.write_text(content)
     with refused(DatabaseError, words, "build the database again"):
         open_store(stored)
+
+
+def test_a_store_without_the_ground_of_its_database_is_refused(tmp_path: Path) -> None:
+    path, viewpoints = tmp_path / "city.parquet", ViewpointSpec(mode="streets")
+    hidden = build_database(TOWN, footprints=HOUSES, streets=STREETS, viewpoints=viewpoints)
+    save_with_store(hidden, ObjectStore.of(TOWN, footprints=HOUSES, streets=STREETS), path)
+    manifest = store_path(path) / "manifest.json"
+    content = json.loads(manifest.read_text())
+    names = {"footprints.parquet": "buildings", "streets.parquet": "streets"}
+    for name, what in names.items():
+        files = {key: value for key, value in content["files"].items() if key != name}
+        manifest.write_text(json.dumps(content | {"files": files}))
+        with refused(DatabaseError, name, "damaged"):
+            open_store(path)
+        kept = (store_path(path) / name).rename(tmp_path / name)
+        with refused(DatabaseError, f"lacks the {what} that the database was built with"):
+            open_store(path)
+        assert open_city(path).objects is None
+        kept.rename(store_path(path) / name)
+    manifest.write_text(json.dumps(content))
+    assert open_store(path).streets is not None
+
+
+@pytest.mark.parametrize("change", ["replaced", "missing", "added"])
+def test_changed_inputs_of_tiles_are_refused(parts: Path, tmp_path: Path, change: str) -> None:
+    inputs = parts / "_inputs"
+    if change == "replaced":  # by objects of another city in the same place
+        save_objects(fewer(7), inputs / "objects.parquet")
+    elif change == "added":
+        shutil.copy(inputs / "objects.parquet", inputs / "buildings.parquet")
+    else:
+        (inputs / "objects.parquet").rename(tmp_path / "objects.parquet")
+    with refused(DatabaseError, "_inputs", "build the database again"):
+        open_store(parts)
+    manifest = json.loads((parts / "_manifest.json").read_text())
+    assert manifest["inputs"].keys() == {"objects.parquet"}
+
+
+def test_objects_of_another_city_are_recognized() -> None:
+    database = build_database(TOWN)
+    assert share_seen(database, TOWN) == 1.0
+    assert share_seen(build_database(TOWN, footprints=HOUSES), TOWN) == 1.0
+    assert 0.5 < share_seen(database, fewer(len(TOWN) // 5)) < 1.0
+    assert share_seen(database, random_town(seed=99).street_objects) < 0.2
 
 
 def test_reading_changes_nothing(stored: Path) -> None:

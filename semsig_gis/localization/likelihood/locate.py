@@ -437,6 +437,7 @@ class LikelihoodLocator:
     unplaced: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
     undirected: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -704,6 +705,7 @@ class LikelihoodLocator:
                 *reading.notes,
                 *_prior_notes(ratio),
                 *self.north.notes,
+                *self.notes,
             ),
             answer=answer,
             estimate=estimate,
@@ -801,6 +803,7 @@ class LikelihoodOptions(TypedDict, total=False):
     known: Mapping[str, Any]
     surely_here: bool
     city: City | ObjectStore | None
+    notes: tuple[str, ...]
 
 
 class LocateOptions(LikelihoodOptions, total=False):
@@ -833,7 +836,7 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         count, grid north by default. ``surely_here`` is whether views are surely from the area of
         the database; otherwise they are from elsewhere with a chance of 0.5 before their objects
         are compared (see `likelihood.elsewhere`). The ``city``, by default the store, names
-        places and is drawn.
+        places and is drawn. The ``notes`` are added to those of the answer.
 
     Returns
     -------
