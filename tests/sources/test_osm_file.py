@@ -297,6 +297,28 @@ def test_element_in_several_extracts_counts_once(tmp_path: Path, case: str) -> N
         assert not layer.errors
 
 
+@pytest.mark.parametrize("suffix", ["osm", "osh", "osh.pbf"])
+@pytest.mark.parametrize("case", OVERLAPS)
+def test_newest_version_in_a_history_counts(tmp_path: Path, case: str, suffix: str) -> None:
+    *extracts, expected = OVERLAPS[case]
+    elements = sorted(
+        itertools.chain(*extracts),
+        key=lambda text: ("nwr".index(text[1]), int(text.split('"')[1]), len(text)),
+    )
+    path = write_osm(tmp_path / "xml", *elements)
+    xml, path = path, tmp_path / f"history.{suffix}"
+    if suffix == "osh.pbf":
+        with osmium.SimpleWriter(str(path)) as writer:
+            for element in osmium.FileProcessor(osmium.io.File(str(xml), "xml")):
+                writer.add(element)
+    else:
+        xml.rename(path)
+    (layer,) = read_layers(path, [BENCHES])
+    middles = shapely.centroid(layer.table.geometry.array)
+    assert dict(zip(shapes_by_id(layer), shapely.to_wkt(middles), strict=True)) == expected
+    assert not layer.errors
+
+
 def test_merging_extracts_keeps_tags(tmp_path: Path) -> None:
     strange = {"name": 'Bänke, "alt" = 100 % @\n木 \U0001f333', "amenity": "bench", "a:b": " x "}
     path = write_osm(tmp_path / "a.osm", node(-5, -1.2345678, 2.0000001, strange))

@@ -9,10 +9,12 @@ import bz2
 import collections
 import dataclasses
 import gzip
+import itertools
+import operator
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal, cast
 from xml.etree import ElementTree as ET  # without entities, see `_read_xml`
 
 import numpy as np
@@ -43,8 +45,17 @@ if TYPE_CHECKING:
 LONGEST_REMARK = 300
 EXHAUSTED = ("timed out", "out of memory")
 KINDS = frozenset(KIND_BY_LETTER.values())
-# What only Overpass servers and editors write in XML.
-CHUNK_BYTES, OVERLAP_BYTES = 2**22, 2**10
+# What only Overpass servers and editors write in XML, and the kinds and numbers of elements.
+NAMES = tuple(
+    map(
+        re.compile,
+        (
+            rb"<([nwr])[a-z]+ id=[\"'](-?\d+)",
+            rb"<(node|way|relation)\s(?:[^>]*?\s)?id\s*=\s*[\"'](-?\d+)",
+        ),
+    )
+)
+CHUNK_BYTES = 2**22
 DIALECTS = tuple(
     map(
         re.compile,
@@ -53,7 +64,7 @@ DIALECTS = tuple(
             rb"<center\s",
             rb"<nd\s[^>]*\slat",
             rb"<member\s[^>]*(?<!/)>",
-            rb"<(?:node|way|relation)\s[^>]*(?<!/)>\s*<bounds\s",
+            rb"<bounds\s[^>]*>\s*<(?:nd|member|tag)\b",
             rb"action\s*=\s*[\"']delete",
         ),
     )
@@ -114,24 +125,32 @@ def _open(path: Path) -> BinaryIO:
     return cast("BinaryIO", bz2.open(path)) if suffix == ".bz2" else path.open("rb")
 
 
-def is_dialect(path: Path) -> bool:
-    """Whether an XML file has parts that pyosmium does not read or ignores.
+def xml_form(path: Path) -> Literal["plain", "versions", "dialect"]:
+    """Return whether XML has several versions of elements, or what pyosmium does not read.
 
     SourceError if its root is not that of elements.
     """
-    before = b""
+    form: Literal["plain", "versions"] = "plain"
+    last: tuple[bytes, ...] = ()
+    rest = b""
     try:
         with _open(path) as stream:
+            _check_root(path, stream.read(START_BYTES))
+            stream.seek(0)
             while chunk := stream.read(CHUNK_BYTES):
-                if not before:
-                    _check_root(path, chunk[:START_BYTES])
-                text = before + chunk
+                text, end, rest = (rest + chunk).rpartition(b">")
+                text += end
                 if any(pattern.search(text) for pattern in DIALECTS):
-                    return True
-                before = chunk[-OVERLAP_BYTES:]
+                    return "dialect"
+                if form == "plain":
+                    found = (pattern.findall(text) for pattern in NAMES)  # the usual one first
+                    names = [last, *next(filter(None, found), ())]
+                    last = names[-1]
+                    if any(itertools.starmap(operator.eq, itertools.pairwise(names))):
+                        form = "versions"
     except (EOFError, OSError):
         pass  # pyosmium reports what is damaged
-    return False
+    return form
 
 
 def _check_root(path: Path, start: bytes) -> None:

@@ -123,9 +123,8 @@ def read_layers(
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     files = {path: _file(path) for path in paths}
-    dialects = [
-        path for path in files if _kind(path).startswith("xml") and documents.is_dialect(path)
-    ]
+    forms = {path: documents.xml_form(path) for path in files if _kind(path).startswith("xml")}
+    dialects = [path for path, form in forms.items() if form == "dialect"]
     if dialects:
         others = [path for path in files if path not in dialects]
         more = read_layers(others, specs, filters=filters, crs=crs) if others else ()
@@ -145,7 +144,11 @@ def read_layers(
     index = TagIndex(specs)
     with contextlib.ExitStack() as stack:
         stack.enter_context(read_errors(where))
-        if len(files) == 1 and not any(map(_has_versions, files.values())):
+        if (
+            len(files) == 1
+            and "versions" not in forms.values()
+            and not _has_versions(*files.values())
+        ):
             (file,) = files.values()
             # First the elements with tags, then the lines of the ways that they need.
             outlines = _scan(file, layers, index)
