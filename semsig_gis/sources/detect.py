@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 OVERTURE_COLUMNS = frozenset({"id", "version", "sources", "bbox"})
 # Catalogue of a file by its reader, and a description of the file for the user.
 CATALOG_OF_READER = {
+    "gbfs": ("gbfs", "stations of a GBFS feed"),
+    "gtfs": ("gtfs", "a GTFS feed of public transport"),
+    "mapillary": ("mapillary", "map features of Mapillary"),
     "osm_features": ("openstreetmap", "elements of OpenStreetMap, by its columns"),
     "osm_file": ("openstreetmap", "an extract of OpenStreetMap"),
     "overpass": ("openstreetmap", "an answer of an Overpass server"),
@@ -47,6 +50,8 @@ def detect_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple
         files = files_in(path) if is_folder(path) else [path]
         for file in files or [path]:
             reader = file_reader(file, sure=True) if files else None
+            if reader is None and files and probe_file(file).format in CATALOG_OF_READER:
+                reader = probe_file(file).format
             if reader is None and any(map(OVERTURE_COLUMNS.issubset, probe_file(file).columns)):
                 reader = "overture"
             if reader is None:

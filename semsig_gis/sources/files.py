@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources.osm import features
 from semsig_gis.sources.paths import files_in, is_folder, matches_pattern
-from semsig_gis.sources.probe import probe_file
+from semsig_gis.sources.probe import SourceFormat, probe_file
 from semsig_gis.sources.registry import READERS
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # The reader of layers that are selected by tags, in a file of any format.
 TAGS_READER = "osm_file"
+# Readers that are named as the format that they read.
+SOURCE_FORMATS = frozenset(get_args(SourceFormat))
 # Number of layers with the same files that a message lists.
 MOST_NAMES = 4
 
@@ -86,8 +88,7 @@ def find_files(
             [path for path in in_folders if matches_pattern(path.name, any_)] for any_ in patterns
         )
         candidates = direct_files or next(filter(None, in_folder), [])
-        if spec.reader == TAGS_READER:
-            candidates = [*candidates, *tagged]
+        candidates = [*candidates, *(path for path, name in tagged if name == spec.reader)]
         if len(candidates) > 1 and not (spec.unique_id or merging):
             names = " and ".join(str(path) for path in candidates)
             raise SourceError(f"layer {spec.name!r} is matched by {names}; give one of them.")
@@ -99,11 +100,12 @@ def find_files(
 
 def _group_paths(
     specs: Sequence[LayerSpec], paths: Iterable[str | Path]
-) -> tuple[list[Path], list[Path], list[Path]]:
-    """Return the files given directly, the files in folders, and the files with tags."""
+) -> tuple[list[Path], list[Path], list[tuple[Path, str]]]:
+    """Return the files given directly, the files in folders, and other files with their readers."""
     files: list[Path] = []
     in_folders: list[Path] = []
-    tagged: list[Path] = []
+    tagged: list[tuple[Path, str]] = []
+    formats = {spec.reader for spec in specs} & SOURCE_FORMATS
     by_tags = any(spec.reader == TAGS_READER for spec in specs)
     for path in dict.fromkeys(Path(item) for item in paths):
         if not path.exists():
@@ -113,10 +115,14 @@ def _group_paths(
             (in_folders if is_folder(path) else files).extend(inside)
             continue
         with_tags = []
-        # Only layers that are selected by tags may be in a file of any name.
-        for file in inside if by_tags else ():
+        # Layers that are selected by tags, and those of a format that shows by its content, may be
+        # in a file of any name.
+        for file in inside if by_tags or formats else ():
             with contextlib.suppress(*([SourceError] if is_folder(path) else [])):
-                with_tags += [] if file_reader(file) is None else [file]
+                if by_tags and file_reader(file) is not None:
+                    with_tags.append((file, TAGS_READER))
+                elif (name := probe_file(file).format) in formats:
+                    with_tags.append((file, name))
         if not with_tags:
             patterns: dict[tuple[str, ...], list[str]] = {}
             for spec in specs:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import re
+import zipfile
 from dataclasses import dataclass
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Literal
 
 from semsig_gis.sources import parquet, vector
@@ -16,19 +18,29 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources.vector.member import LayerDescription, Member
 
+# Sources with a catalogue of their own.
+SourceFormat = Literal["gbfs", "gtfs", "mapillary"]
 VECTOR_SUFFIXES = ARCHIVES | {
     suffix for suffix, driver in DRIVERS.items() if driver not in {CSV, *WORKBOOKS}
 }
-# Suffixes of text files with elements of OpenStreetMap, which their beginning shows.
-ELEMENT_SUFFIXES = frozenset(
+# Suffixes of text files of certain sources, which their beginning shows.
+TEXT_SUFFIXES = frozenset(
     {"", ".geojson", ".geojsonl", ".json", ".jsonl", ".ndjson", ".txt", ".xml"}
 )
 # Their beginning has the root of XML, or the first element of JSON: of an answer of a server,
-# or of a list or lines of elements.
+# or of a list or lines of elements of OpenStreetMap.
 START_BYTES = 2**16
 BOM = b"\xef\xbb\xbf"
 ROOT = re.compile(rb"<(osm\w*)[\s>]")
 ELEMENT = re.compile(rb'"(?:elements"\s*:\s*\[|type"\s*:\s*"(?:node|way|relation)")')
+# Keys of other sources, all of which are there.
+KEYS: dict[SourceFormat, tuple[re.Pattern[bytes], ...]] = {
+    "gbfs": tuple(map(re.compile, (rb'"data"\s*:', rb'"stations"\s*:\s*\[', rb'"station_id"'))),
+    "mapillary": tuple(
+        map(re.compile, (rb'"(?:object_)?value"\s*:\s*"[a-z-]+--', rb'"coordinates"\s*:'))
+    ),
+}
+GTFS_TABLES = frozenset({"agency.txt", "routes.txt", "stop_times.txt", "stops.txt", "trips.txt"})
 MOST_PROBES = 256
 
 
@@ -39,7 +51,7 @@ class FileProbe:
     Only vector files have `layers`, and only these and Parquet files have `columns`.
     """
 
-    format: Literal["osm", "overpass", "parquet", "vector", "other"]
+    format: Literal["osm", "overpass", "parquet", "vector", "other"] | SourceFormat
     layers: tuple[tuple[Member, LayerDescription], ...] = ()
     columns: tuple[tuple[str, ...], ...] = ()
 
@@ -57,18 +69,39 @@ def _probe(path: Path, suffix: str, stamp: tuple[tuple[int, int, int], ...]) -> 
     """Open a file; `stamp` is the part of the cache's key that changes with the file."""
     if suffix in parquet.SUFFIXES and stamp:
         return FileProbe("parquet", columns=(tuple(parquet.column_names(path)),))
-    if suffix in ELEMENT_SUFFIXES and stamp and (kind := elements_format(path)):
+    if suffix in TEXT_SUFFIXES and stamp and (kind := text_format(path)):
         return FileProbe(kind)
+    if suffix == ".zip" and stamp and _is_feed(path):
+        return FileProbe("gtfs")
     if suffix not in VECTOR_SUFFIXES or not stamp:
         return FileProbe("other")
     layers = vector.spatial_layers(path)
     return FileProbe("vector", layers, tuple(layer.fields for _, layer in layers))
 
 
-def elements_format(path: Path) -> Literal["osm", "overpass"] | None:
-    """Return whether a text file has elements as XML ("osm") or JSON ("overpass"), or None."""
+def text_format(path: Path) -> Literal["osm", "overpass"] | SourceFormat | None:
+    """Return the format of a text file of a certain source, or None.
+
+    Elements of OpenStreetMap are "osm" as XML and "overpass" as JSON.
+    """
     with path.open("rb") as stream:
         start = stream.read(START_BYTES)
-    if start.removeprefix(BOM).lstrip().startswith(b"<"):
+    start = start.removeprefix(BOM).lstrip()
+    if start.startswith(b"<"):
         return "osm" if ROOT.search(start) else None
+    if path.name.lower() == "stops.txt" and b"stop_lat" in start:
+        return "gtfs"
+    for kind, keys in KEYS.items():
+        if all(key.search(start) for key in keys):
+            return kind
     return "overpass" if ELEMENT.search(start) and b'"Feature' not in start else None
+
+
+def _is_feed(path: Path) -> bool:
+    """Whether an archive is a feed of public transport."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = {PurePosixPath(name).name.lower() for name in archive.namelist()}
+    except (OSError, ValueError, zipfile.BadZipFile):
+        return False
+    return "stops.txt" in names and len(names & GTFS_TABLES) > 1

@@ -49,6 +49,8 @@ if TYPE_CHECKING:
 
 NAMES = (
     "barcelona",
+    "gbfs",
+    "gtfs",
     "hamburg",
     "mapillary",
     "melbourne",

@@ -15,6 +15,7 @@ from semsig_gis.sources import (
     AccessToken,
     HttpError,
     HttpSpec,
+    detect_catalogs,
     load_catalog,
     parse_area,
 )
@@ -55,15 +56,22 @@ VALUES = {
 }
 
 
-@pytest.mark.parametrize("form", ["answer", "geojson"])
+@pytest.mark.parametrize("form", ["answer", "answers", "list", "geojson", "older geojson"])
 def test_value_belongs_to_its_layer(tmp_path: Path, form: str) -> None:
     features = [feature(number, value) for number, value in enumerate(VALUES)]
     content: dict[str, Any] = {"data": features}
-    if form == "geojson":
+    if form == "older geojson":
+        features = [
+            {"key": item["id"], "value": item["object_value"], "geometry": item["geometry"]}
+            for item in features
+        ]
+    if form.endswith("geojson"):
         parts = [{"geometry": item.pop("geometry"), "properties": item} for item in features]
         content = {"type": "FeatureCollection", "features": parts}
-    path = tmp_path / "map_features.json"
-    path.write_text(json.dumps(content), "utf-8")
+    path = tmp_path / "points.json"
+    forms = {"answers": [{"data": features[:2]}, {"data": features[2:]}], "list": features}
+    path.write_text(json.dumps(forms.get(form, content)), "utf-8")
+    assert detect_catalogs([path])[0] == ("mapillary",)
     layers = read_layers([path, path], CATALOG.layers)  # an id counts once
     counts = {item.spec.name: len(item.table) for item in layers if len(item.table)}
     names = [name for name in VALUES.values() if name]

@@ -31,7 +31,7 @@ from semsig_gis.sources.osm.elements import (
 from semsig_gis.sources.osm.features import CHANGES, FORMATS
 from semsig_gis.sources.osm.merge import age_notes, merge_extracts, read_errors
 from semsig_gis.sources.paths import require_file
-from semsig_gis.sources.probe import elements_format
+from semsig_gis.sources.probe import text_format
 from semsig_gis.sources.rows import WGS84, BadFeatureError
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ def _kind(path: Path) -> str:
     if name.endswith(CHANGES):
         raise documents.changes_error(path)
     kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
-    if kind is None and elements_format(path) == "osm":
+    if kind is None and text_format(path) == "osm":
         return "xml"
     if kind is None:
         raise SourceError(f"{path} is not an OpenStreetMap file; give one of {', '.join(FORMATS)}.")

@@ -68,19 +68,28 @@ def load_features(path: Path, *, where: str = "") -> list[dict[str, Any]]:
     """Read a JSON file of Mapillary map features as dictionaries; SourceError if it is not one."""
     try:
         content = parse_json(path.read_bytes())
-        if "data" in content:
-            features = list(content["data"])
-        else:
-            features = [
-                {**item["properties"], "geometry": item["geometry"]} for item in content["features"]
-            ]
-        if all("object_value" in item for item in features):
+        pages = content if isinstance(content, list) else [content]
+        features = [
+            _as_feature(item)
+            for page in pages
+            for item in (page["data"] if "data" in page else page.get("features", [page]))
+        ]
+        if content != [] and all("object_value" in item for item in features):
             return features
     except (AttributeError, KeyError, OSError, TypeError, ValueError):
         pass
     raise SourceError(
         f"{where or path} is not an answer of Mapillary about map features; download it again."
     )
+
+
+def _as_feature(item: dict[str, Any]) -> dict[str, Any]:
+    """Return a map feature with the names of the Graph API; older files have others."""
+    feature = {**item, **(item.get("properties") or {})}
+    older = (("object_value", "value"), ("id", "key"))
+    return feature | {
+        name: feature[old] for name, old in older if name not in feature and old in feature
+    }
 
 
 def fetch_layers(
