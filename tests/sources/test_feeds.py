@@ -20,8 +20,7 @@ STATIONS = [
     for number in range(4)
 ]
 LANGUAGES = [
-    item
-    | {"name": [{"text": item["name"], "language": "en"}], "is_virtual_station": number == 0}
+    item | {"name": [{"text": item["name"], "language": "en"}], "is_virtual_station": number == 0}
     for number, item in enumerate(STATIONS)
 ]
 STOPS = {"0": "", "1": "0", "2": "1", "3": "2", "4": "0", "5": "3", "6": "0"}
