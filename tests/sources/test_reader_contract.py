@@ -16,6 +16,7 @@ import osmium
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+import pyogrio
 import pytest
 import shapely
 from geojson import collection, feature, point
@@ -68,6 +69,51 @@ def write_vector(path: Path, rows: Rows) -> None:
     # FlatGeobuf would put the rows in another order for its index.
     options = {"SPATIAL_INDEX": "NO"} if path.suffix == ".fgb" else {}
     write_table(frame(rows), path.parent, path.suffix[1:], geometry_type="Point", **options)
+
+
+def write_by(driver: str, **options: str) -> Callable[[Path, Rows], None]:
+    """Return a writer of files by a driver of GDAL."""
+
+    def write(path: Path, rows: Rows) -> None:
+        frame(rows).to_file(path, driver=driver, geometry_type="Point", **options)
+
+    return write
+
+
+def write_geodatabase(path: Path, rows: Rows) -> None:
+    write_by("OpenFileGDB", TARGET_ARCGIS_VERSION="ARCGIS_PRO_3_2_OR_LATER")(path, rows)
+
+
+def write_sheet(path: Path, rows: Rows) -> None:
+    table = frame(rows)
+    columns = pd.DataFrame(table.drop(columns="geometry"))
+    columns = columns.assign(lon=table.geometry.x, lat=table.geometry.y)
+    pyogrio.write_dataframe(columns, path, driver=path.suffix[1:].upper())
+
+
+def write_compressed(path: Path, rows: Rows) -> None:
+    plain = path.with_name("plain.geojson")
+    write_by("GeoJSON")(plain, rows)
+    path.write_bytes(gzip.compress(plain.read_bytes()))
+
+
+def write_topology(path: Path, rows: Rows) -> None:
+    """Write TopoJSON with positions as multiples of the step."""
+    geometries = [
+        {"type": "Point", "coordinates": [n, 0], "properties": row} for n, row in enumerate(rows)
+    ]
+    objects = {"things": {"type": "GeometryCollection", "geometries": geometries}}
+    transform = {"scale": [STEP, 1], "translate": [X, Y]}
+    topology = {"type": "Topology", "transform": transform, "objects": objects, "arcs": []}
+    path.write_text(json.dumps(topology))
+
+
+def write_map(path: Path, rows: Rows) -> None:
+    """Write a saved map of uMap, of which one layer is empty."""
+    features = [feature(point(*place), row) for place, row in zip(places(rows), rows, strict=True)]
+    layers = [{**collection(found), "_umap_options": {"name": "x"}} for found in ([], features)]
+    content = {"type": "umap", "geometry": point(9, 9), "properties": {}, "layers": layers}
+    path.write_text(json.dumps(content))
 
 
 def write_parquet(path: Path, rows: Rows) -> None:
@@ -169,6 +215,19 @@ KINDS = {
     "GeoPackage": Case("vector_file", "gpkg", write_vector, THINGS, "cannot be read ("),
     "shapefile": Case("vector_file", "shp", write_vector, THINGS),
     "archive": Case("vector_file", "zip", write_vector, THINGS, "(File is not a zip file)"),
+    "GeoJSON in lines": Case("vector_file", "ndjson", write_by("GeoJSONSeq"), THINGS, crs=LAMBERT),
+    "GeoJSON, separated": Case("vector_file", "json", write_by("GeoJSONSeq", RS="YES"), THINGS,
+                               crs=LAMBERT),
+    "GeoJSON, gzip": Case("vector_file", "geojson.gz", write_compressed, THINGS, "cannot be read"),
+    "TopoJSON": Case("vector_file", "topojson", write_topology, THINGS, "cannot be read (",
+                     crs=LAMBERT),
+    "uMap": Case("vector_file", "umap", write_map, THINGS, crs=LAMBERT),
+    "SQLite": Case("vector_file", "sqlite", write_by("SQLite"), THINGS, "cannot be read ("),
+    "KML": Case("vector_file", "kml", write_by("LIBKML"), THINGS),
+    "MapInfo": Case("vector_file", "mif", write_by("MapInfo File"), THINGS),
+    "geodatabase": Case("vector_file", "gdb", write_geodatabase, THINGS, folder="not the kind"),
+    "Excel": Case("vector_file", "xlsx", write_sheet, THINGS, crs=LAMBERT),
+    "OpenDocument": Case("vector_file", "ods", write_sheet, THINGS, crs=LAMBERT),
     "OSM": Case("osm_file", "osm", write_extract, TAGGED, DAMAGED),
     "OSM, gzip": Case("osm_file", "osm.gz", write_extract, TAGGED, DAMAGED),
     "OSM, bzip2": Case("osm_file", "osm.bz2", write_extract, TAGGED, DAMAGED),
@@ -188,14 +247,17 @@ KINDS = {
     "GeoParquet": Case("opendatasoft", "parquet", write_parquet, THINGS, "is not a whole Parquet"),
     "GML": Case("wfs", "gml", write_gml, THINGS, "is not whole GML", crs=LAMBERT),
 }  # fmt: skip
-# Only vector files are read by more than one engine.
+# Only some vector files are read by more than one engine.
+BY_FIONA = {"csv", "fgb", "geojson", "gpkg", "shp", "zip"}
 EACH = [
     (engine, kind)
     for kind, case in KINDS.items()
-    for engine in (ENGINES if case.reader == "vector_file" else ENGINES[:1])
+    for engine in (ENGINES if case.suffix in BY_FIONA else ENGINES[:1])
 ]
 WITH_VALUES = [(engine, kind) for engine, kind in EACH if kind != "Mapillary"]
 WITH_FIELDS = [(engine, kind) for engine, kind in WITH_VALUES if KINDS[kind].spec is not TAGGED]
+# Files of these kinds that have no rows are empty, or say nothing of their fields.
+WITHOUT_HEAD = {"table of OSM", "GeoJSON in lines", "GeoJSON, separated", "Excel", "OpenDocument"}
 # The other readers read the rows before the end, or cannot detect it.
 DETECTING = [(engine, kind) for engine, kind in EACH if KINDS[kind].truncated]
 
@@ -291,7 +353,7 @@ def test_class_by_where_and_not_select_rows(write: Write) -> None:
 
 
 # A table without rows does not show that it is from OpenStreetMap.
-@by_each([case for case in EACH if case[1] != "table of OSM"])
+@by_each([case for case in EACH if case[1] not in WITHOUT_HEAD])
 def test_file_without_rows_is_accepted(write: Write) -> None:
     layer = write([])(rows=(1, 5))
     assert (layer.counts, layer.notes) == (RowCounts(read=0), ("the layer has no rows",))
@@ -379,7 +441,27 @@ REPORT = b"<ExceptionReport><ExceptionText>No.</ExceptionText></ExceptionReport>
 TIMED_OUT = b'{"elements": [], "remark": "runtime error: Query timed out after 91 seconds."}'
 OSM = b'<osm version="0.6"><node id="1" version="1" lat="48" lon="2"/></osm>'
 OSM_BOMB = b'<!DOCTYPE osm [<!ENTITY a "aaaa">]><osm version="0.6">&a;</osm>'
+PAGE = b"<!DOCTYPE html><html><body>Log in</body></html>"
+TRACK = b'<trk><trkseg><trkpt lat="48" lon="2"/><trkpt lat="49" lon="2"/></trkseg></trk>'
+GPX = b'<gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1">' + TRACK + b"</gpx>"
+LINK = b"<OGRVRTDataSource><!-- <kml --></OGRVRTDataSource>"
 WRONG_FILES: list[tuple[str, str, bytes, str]] = [
+    *(("vector_file", f"a.{suffix}", PAGE, "web page")
+      for suffix in ("csv", "geojson", "gpkg", "kml", "shp", "xlsx", "zip", "html")),
+    ("vector_file", "a.csv", b"PK\3\4" + bytes(99), "a ZIP archive: rename it to end with .zip"),
+    ("vector_file", "a.geojson", gzip.compress(b"{}"), "add .gz to its name"),
+    ("vector_file", "a.geojson", b"lon,lat\n1,2\n", "rename it to end with .csv"),
+    ("vector_file", "a", b"lon,lat\n1,2\n", "rename it to end with .csv"),
+    ("vector_file", "a.xml", b"<kml></kml>", "rename it to end with .kml"),
+    ("vector_file", "a.kml", LINK, "not the kind"),
+    *(("vector_file", name, b"var x = {}", "JavaScript") for name in ("a.js", "a.geojson")),
+    *(("vector_file", name, b"Rar!", "unpack it") for name in ("a.rar", "a.7z", "a.tar.gz")),
+    ("vector_file", "a.sql", b"SET x;", "`ogr2ogr out.gpkg PG:"),
+    ("vector_file", "a.e00", b"EXP", "`ogr2ogr out.gpkg a.e00`"),
+    ("vector_file", "a.dbf", b"\3", "give its .shp"),
+    ("vector_file", "a.gdb", b"x", "give the folder"),
+    ("vector_file", "a.gpx", GPX, "has 1 tracks and 0 routes, but no waypoints"),
+    ("vector_file", "a.topojson", b'{"type": "Topology", "arcs": [1]}', "not whole"),
     *(("vector_file", f"a.{suffix}", content, f"a.{suffix}")
       for suffix in ("fgb", "geojson", "gpkg", "json", "shp")
       for content in (b"", b'[{"a": 1}]')),

@@ -198,46 +198,6 @@ def test_shapefile_without_encoding_is_utf8_or_else_latin(tmp_path: Path, encodi
     assert bool(said) == (encoding != "UTF-8")
 
 
-# The name of a field and values in an encoding.
-TEXTS = {
-    "cp949": ("종류", "벤치", "가로등", "쓰레기통"),
-    "cp932": ("種別", "ベンチ", "街灯", "ゴミ箱"),
-    "gb18030": ("类型", "长椅", "路灯", "垃圾桶"),
-    "cp1251": ("тип", "Скамейка", "Фонарь", "Урна"),
-    "cp866": ("тип", "Скамейка", "Фонарь", "Урна"),
-    "cp1250": ("typ", "ławka", "śmietnik", "źródło"),
-    "cp1253": ("είδος", "Παγκάκι", "δέντρο", "φανοστάτης"),
-    "utf-8": ("тип", "Скамейка", "Фонарь", "Урна"),
-}
-
-
-@pytest.mark.parametrize("language_driver", [0x00, 0x57])
-@pytest.mark.parametrize("encoding", TEXTS)
-def test_unstated_encoding_of_a_shapefile_is_found(
-    tmp_path: Path, encoding: str, language_driver: int
-) -> None:
-    field, *kinds = TEXTS[encoding]
-    path = tmp_path / "things.shp"
-    frame([(1, 2), (3, 4), (5, 6)], kind=["x" * 20] * 3).to_file(path, encoding="ISO-8859-1")
-    path.with_suffix(".cpg").unlink()
-    table = path.with_suffix(".dbf")
-    content = bytearray(table.read_bytes())
-    content[29] = language_driver
-    content[32:43] = field.encode(encoding).ljust(11, b"\0")
-    for kind in kinds:
-        at = content.index(b"x" * 20)
-        content[at : at + 20] = kind.encode(encoding).ljust(20)
-    table.write_bytes(content)
-    guessed, stated = (read(path, id_field=field, encoding=by) for by in (None, encoding))
-    for layer in (guessed, stated):
-        assert layer.table["source_id"].tolist() == kinds
-    said = f"the encoding is not stated; read as {encoding}"
-    assert [said in note for note in guessed.notes] == [True] * (encoding != "utf-8")
-    assert stated.notes == ()
-    (info,) = list_layers(path)
-    assert (info.encoding and info.encoding.encoding) == (None if encoding == "utf-8" else encoding)
-
-
 def test_field_names_of_a_shapefile_without_encoding_are_latin(tmp_path: Path) -> None:
     table = frame([(1, 2), (3, 4)], catégorie=["allée", "square"])
     path = tmp_path / "things.shp"

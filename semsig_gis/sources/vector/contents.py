@@ -7,6 +7,7 @@ import functools
 import gzip
 import itertools
 import json
+import re
 import shutil
 import struct
 import zipfile
@@ -58,6 +59,8 @@ MOST_FILES = 16
 MOST_NAMES = 8
 SHAPEFILE_PARTS = (".shp", ".dbf", ".prj", ".cpg")
 HEADER_BYTES = 100
+# Numbers with all the decimals that a program computes with.
+LONG_NUMBER = re.compile(r"-?\d+\.\d{15,}")
 # Exceptions of zipfile for damaged archives.
 _ZIP_FAULTS = (
     *(EOFError, IndexError, NotImplementedError, OSError, RuntimeError, ValueError),
@@ -223,7 +226,7 @@ def _from_json(member: Member) -> Iterator[Member]:
     stem = member.path.stem
     for name, records in layers.items():
         features = [_feature(record) for record in records]
-        if all(item is None for item in features):
+        if records and all(item is None for item in features):
             yield replace(member, layer=name or None, copy=_table(records, stem))
             continue
         copy = Copy(f"{stem}.geojson")
@@ -278,9 +281,13 @@ def _from_workbook(member: Member) -> list[Member]:
         columns = read(
             member.address, layer=name, read_geometry=False, HEADERS="DISABLE", FIELD_TYPES="STRING"
         )[3]
-        rows = np.array(columns, dtype=object).T
-        filled = [row for row in rows.tolist() if any(value not in {None, ""} for value in row)]
-        if len(filled) > 1:
+        rows = np.array(columns, dtype=object).T.tolist()
+        filled = [
+            [repr(float(value)) if LONG_NUMBER.fullmatch(value or "") else value for value in row]
+            for row in rows
+            if any(value not in {None, ""} for value in row)
+        ]
+        if filled:
             table = Copy(f"{member.path.stem}.csv")
             _write_csv(table.path, filled)
             sheets.append(replace(member, layer=name, copy=table))

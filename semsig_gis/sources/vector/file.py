@@ -231,6 +231,8 @@ def _read_rows(
                 raise
             read_each = by_pyogrio.read_each
         rows, notes = read_each(member, fields, layer.rows)
+    if member.driver == GEOJSON and rows.read < layer.rows:
+        rows.mark_unreadable(layer.rows, "has the identifier of another row")
     # A geometry of GeoJSON that is not null but cannot be read; GDAL may count differently, so that
     # rows cannot be assigned.
     if member.driver == GEOJSON and rows.read == layer.rows:

@@ -37,7 +37,8 @@ def converted(text: str) -> Mapping[str, Sequence[Mapping[str, Any]]] | None:
     except ValueError:
         records = list(_in_lines(text))
         whole = sum(record is not UNREADABLE for record in records)
-        return {"": records} if 2 * whole > len(records) > 1 else None
+        several = len(records) > 1 or RECORD_SEPARATOR in text
+        return {"": records} if several and 2 * whole > len(records) else None
     if not isinstance(document, dict):
         return None
     if document.get("type") == "Topology":
@@ -46,7 +47,7 @@ def converted(text: str) -> Mapping[str, Sequence[Mapping[str, Any]]] | None:
         except (AttributeError, LookupError, TypeError):
             raise ValueError("it is not whole TopoJSON") from None
     if document.get("type") == "umap" and isinstance(document.get("layers"), list):
-        return dict(_umap(document["layers"]))
+        return dict(_umap(document["layers"])) or {"": []}
     return None
 
 
