@@ -139,14 +139,15 @@ def open_csv(open_: Callable[[], IO[bytes]], what: str, *, encoding: str | None 
     stated = STATED_SEPARATOR.fullmatch(lines[0]) if lines else None
     marks = stated[1] if stated else SEPARATORS
     first = int(bool(stated))
-    plain = [_layout(lines, mark, first) for mark in marks]
-    if not any(item.fits for item in plain):
-        # Titles and comments may stand before the table, and blanks between its columns.
-        plain = [_layout(lines, mark, first, titles=True) for mark in marks]
-        blanks = _layout(lines, BLANK, first, titles=True)
-        if blanks.fits and not any(item.fits for item in plain):
-            plain = [blanks]
-    for item in sorted(plain, key=lambda item: (not item.fits, -len(item.names), item.separator)):
+    found = [_layout(lines, mark, first) for mark in marks]
+    most = max((len(item.names) for item in found if item.fits), default=0)
+    # Titles and comments may stand before the table, and blanks between its columns.
+    titled = [_layout(lines, mark, first, titles=True) for mark in marks]
+    if any(item.fits and len(item.names) > most for item in titled):
+        found = titled
+    elif not most and (blanks := _layout(lines, BLANK, first, titles=True)).fits:
+        found = [blanks]
+    for item in sorted(found, key=lambda item: (not item.fits, -len(item.names), item.separator)):
         layouts[item.separator], starts[item.separator] = item.names, item.start
     if not any(name for names in layouts.values() for name in names):
         raise SourceError(
@@ -182,29 +183,33 @@ class _Layout(NamedTuple):
 def _layout(lines: Sequence[str], separator: str, first: int, *, titles: bool = False) -> _Layout:
     """Return the layout from line `first` on; with `titles`, lines before the header may be others.
 
-    These have at most half as many cells as the table, or are comments.
+    The header is then the first line with as many cells as the table, and no values in them.
     """
-    rows = [
-        row for row in _rows(lines, separator) if row[0] >= first and any(map(str.strip, row[1]))
-    ]
+    parsed = [item for item in _rows(lines, separator) if item[0] >= first]
+    bad = sum(row is None for _, row in parsed)
+    rows = [(number, row) for number, row in parsed if row and any(map(str.strip, row))]
     if not rows:
         return _Layout(separator, first, (), fits=False)
     widths = Counter(len(_trimmed(row)) for _, row in rows)
     width = max(widths, key=lambda size: (widths[size], size))
     start, names = rows[0]
+    blanks = separator == BLANK
     for number, row in rows if titles else ():
         cells = [cell for cell in row if cell.strip()]
-        comment = cells[0].lstrip().startswith("#") and len(_trimmed(row)) < width
-        if 2 * len(cells) > width and not comment:
-            if not any(_is_value(cell, blanks=separator == BLANK) for cell in cells):
-                start, names = number, row
+        size = len(_trimmed(row))
+        enough = size == width if blanks else size >= width and 2 * len(cells) > width
+        if enough and not any(_is_value(cell, blanks=blanks) for cell in cells):
+            start, names = number, row
+            if not blanks:  # where any sentence may have as many words, the last one counts
+                break
+        elif enough:
             break
     if names[0].lstrip().startswith("#") and len(names) > 1:  # a comment for some programs
         first_name = names[0].strip().removeprefix("#")
         names = [first_name, *names[1:]] if first_name else names[1:]
     others = [len(_trimmed(row)) for number, row in rows if number > start]
     same = sum(size == len(_trimmed(names)) for size in others)
-    need = len(others) if separator == BLANK else len(others) / 2
+    need = (len(others) + bad) / (1 if blanks else 2)
     fits = len(names) > 1 and same >= need
     return _Layout(separator, start, tuple(name.strip() for name in names), fits)
 
@@ -222,8 +227,8 @@ def _trimmed(row: Sequence[str]) -> Sequence[str]:
     return row[:size]
 
 
-def _rows(lines: Sequence[str], separator: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the readable rows of lines, each with the number of lines before it."""
+def _rows(lines: Sequence[str], separator: str) -> Iterator[tuple[int, list[str] | None]]:
+    """Yield the rows of lines, None for bad ones, each with the number of lines before it."""
     reader = _parsed(lines, separator)
     while True:
         number = reader.line_num
@@ -232,13 +237,16 @@ def _rows(lines: Sequence[str], separator: str) -> Iterator[tuple[int, list[str]
         except StopIteration:
             return
         except csv.Error:
-            continue
+            yield number, None
 
 
 def _parsed(lines: Iterable[str], separator: str) -> Any:  # noqa: ANN401 - a type without name
     """Return the reader of lines."""
     if separator == BLANK:
-        lines = (re.sub(r"[ \t]+", BLANK, line.strip()) for line in lines)
+        lines = (
+            re.sub(r"[ \t]+", BLANK, line.strip()) + line[len(line.rstrip("\r\n")) :]
+            for line in lines
+        )
     return csv.reader(lines, delimiter=separator, strict=True)
 
 

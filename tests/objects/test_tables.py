@@ -1,0 +1,170 @@
+"""Tables of positions in any layout, notation and language: drafted and loaded to the centimetre."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sentences import refused
+
+from semsig_gis.core import SemsigError, SourceError
+from semsig_gis.objects import draft_catalog, load
+from semsig_gis.sources import transform_points
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from semsig_gis.objects import StreetObjects
+
+    Pair = tuple[float, float]
+
+TOWNS = [(4.8357, 45.764), (-58.3816, -34.6037), (151.2093, -33.8688), (-0.1276, 51.5072),
+         (126.978, 37.5665), (-77.0369, 38.9072), (37.6173, 55.7558), (12.4964, 41.9028)]  # fmt: skip
+# Names of longitude and latitude.
+HEADERS = [
+    ("lon", "lat"), ("Longitude", "Latitude"), ("LNG", "LAT"), ("gps_long", "gps_lat"),
+    ("X", "Y"), ("coord_x", "coord_y"), ("X_WGS84", "Y_WGS84"), ("point.lon", "point.lat"),
+    ("Länge", "Breite"), ("geogr. Länge", "geogr. Breite"), ("Längengrad", "Breitengrad"),
+    ("longitud", "latitud"), ("longitudine", "latitudine"), ("lengtegraad", "breedtegraad"),
+    ("Długość geograficzna", "Szerokość geograficzna"), ("zeměpisná délka", "zeměpisná šířka"),
+    ("Boylam", "Enlem"), ("longitud", "latitud"), ("længdegrad", "breddegrad"), ("lengdegrad", "breddegrad"),
+    ("pituusaste", "leveysaste"), ("hosszúság", "szélesség"), ("долгота", "широта"), ("довгота", "широта"),
+    ("γεωγραφικό μήκος", "γεωγραφικό πλάτος"), ("经度", "纬度"), ("經度", "緯度"), ("경도", "위도"),
+    ("GPS경도", "GPS위도"), ("経度", "緯度"), ("خط الطول", "خط العرض"), ("קו אורך", "קו רוחב"), ("kinh độ", "vĩ độ"),
+    ("bujur", "lintang"), ("x_long", "y_lat"), ("geoLon", "geoLat"),
+]  # fmt: skip
+WHOLE_NAMES = ["location", "geometry", "WKT", "Position", "the_geom", "SHAPE", "coords", "a", "Standort"]
+# Columns that are no positions.
+OTHERS: dict[str, Callable[[int], str]] = {
+    "id": str, "height": lambda row: f"{171 + row / 7:.2f}", "year": lambda row: str(1990 + row),
+    "diameter": lambda row: f"{12 + row}", "postcode": lambda row: f"6900{row % 9}",
+    "number": lambda row: f"{row + 1}", "price": lambda row: f"{row + 10}.50",
+    "date": lambda row: f"2024-05-{row + 1:02}", "time": lambda row: f"{row + 8:02}:30:15",
+    "street": lambda _: "rue_Test", "species": lambda _: "Acer_campestre",
+    "slope": lambda row: f"0.{row + 1:02}345678", "index": lambda row: f"{row}.{row:02}54321",
+    "size": lambda row: f"{row + 2}.5x{row + 3}.5", "phone": lambda row: f"+33-472-1030{row:02}",
+    "width": lambda row: f"{row / 4:.2f}", "plan_no": lambda row: f"{row + 3}/{row + 5}",
+}  # fmt: skip
+
+
+def sexagesimal(value: float, letters: str, style: str) -> str:
+    """Return an angle in degrees and minutes, and mostly seconds."""
+    letter = letters[value < 0]
+    degrees, minutes = divmod(abs(value) * 60, 60)
+    if style == "dm":
+        return f"{degrees:.0f}° {minutes:.7f}' {letter}"
+    whole, seconds = divmod(minutes * 60, 60)
+    if style == "colons":
+        return f"{'-' * (value < 0)}{degrees:.0f}:{whole:02.0f}:{seconds:08.5f}"
+    if style == "blanks":
+        return f"{degrees:.0f} {whole:02.0f} {seconds:08.5f} {letter}"
+    return f"{degrees:.0f}°{whole:02.0f}'{seconds:08.5f}\"{letter}"
+
+
+ANGLES: dict[str, Callable[[float, str], str]] = {
+    "point": lambda value, _: f"{value:.7f}",
+    "comma": lambda value, _: f"{value:.7f}".replace(".", ","),
+    "sign": lambda value, _: f"{value:+.7f}",
+    "degree": lambda value, _: f"{value:.7f}°",
+    "after": lambda value, letters: f"{abs(value):.7f}{letters[value < 0]}",
+    "before": lambda value, letters: f"{letters[value < 0]} {abs(value):.7f}",
+    **{
+        style: lambda value, letters, style=style: sexagesimal(value, letters, style)
+        for style in ("dms", "dm", "colons", "blanks")
+    },
+}
+WHOLES: dict[str, Callable[[float, float], str]] = {
+    "wkt": lambda x, y: f"POINT ({x:.7f} {y:.7f})",
+    "ewkt": lambda x, y: f"SRID=4326;POINT({x:.7f} {y:.7f})",
+    "wkb": lambda x, y: shapely.to_wkb(shapely.Point(x, y), hex=True),
+    "ewkb": lambda x, y: shapely.to_wkb(
+        shapely.set_srid(shapely.Point(x, y), 4326), hex=True, include_srid=True
+    ),
+    "geojson": lambda x, y: json.dumps({"type": "Point", "coordinates": [x, y]}),
+    "texts": lambda x, y: json.dumps({"type": "Point", "coordinates": [str(x), str(y)]}),
+    "json": lambda x, y: json.dumps({"latitude": y, "longitude": x}),
+    "python": lambda x, y: repr({"lat": str(y), "lng": str(x), "address": '{"zip": 1}'}),
+    "uri": lambda x, y: f"geo:{y:.7f},{x:.7f}",
+    "list": lambda x, y: f"[{x:.7f}, {y:.7f}]",
+    "parentheses": lambda x, y: f"({y:.7f}, {x:.7f})",
+    "lat, lon": lambda x, y: f"{y:.7f}, {x:.7f}",
+    "lat lon": lambda x, y: f"{y:.7f} {x:.7f}",
+    "lat;lon": lambda x, y: f"{y:.7f};{x:.7f}",
+    "commas": lambda x, y: f"{y:.7f} {x:.7f}".replace(".", ","),
+    "address": lambda x, y: f"12 rue Test\n69001 Lyon\n({y:.7f}, {x:.7f})",
+    "letters": lambda x, y: f"{ANGLES['after'](y, 'NS')} {ANGLES['after'](x, 'EW')}",
+    "angles": lambda x, y: f"{ANGLES['dms'](y, 'NS')}, {ANGLES['dms'](x, 'EW')}",
+    "words": lambda x, y: f"lat: {y:.7f}, lon: {x:.7f}",
+    "link": lambda x, y: f"https://www.example.org/maps/@{y:.7f},{x:.7f},17z",
+}
+TITLES = ["Street lights of the town", "# exported by hand", "", "Source: the town, 2024"]
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> tuple[bytes, list[Pair]]:
+    """Draw a table and its positions."""
+    lon, lat = draw(st.sampled_from(TOWNS))
+    steps = draw(st.lists(st.tuples(st.integers(0, 300), st.integers(0, 300)), min_size=3,
+                          max_size=9, unique=True))  # fmt: skip
+    places = [(round(lon + a * 1.17e-5, 7), round(lat + b * 1.13e-5, 7)) for a, b in steps]
+    if draw(st.booleans()):
+        names = draw(st.sampled_from(HEADERS))
+        styles = ANGLES[draw(st.sampled_from(sorted(ANGLES)))]
+        columns = {
+            names[0]: [styles(x, "EW") for x, _ in places],
+            names[1]: [styles(y, "NS") for _, y in places],
+        }
+    else:
+        style = WHOLES[draw(st.sampled_from(sorted(WHOLES)))]
+        columns = {draw(st.sampled_from(WHOLE_NAMES)): [style(x, y) for x, y in places]}
+    for name in draw(st.lists(st.sampled_from(sorted(OTHERS)), min_size=1, max_size=6, unique=True)):
+        columns[name] = [OTHERS[name](row) for row in range(len(places))]
+    order = draw(st.permutations(sorted(columns)))
+    separator = draw(st.sampled_from([";", ",", "\t", "|", " "]))
+    text = io.StringIO()
+    ending = draw(st.sampled_from(["\n", "\r\n"]))
+    for title in draw(st.lists(st.sampled_from(TITLES), max_size=3)):
+        text.write(title + ending)
+    if separator != " " and draw(st.booleans()) and not text.getvalue():
+        text.write(f"sep={separator}{ending}")
+    quoting = draw(st.sampled_from([csv.QUOTE_MINIMAL, csv.QUOTE_ALL]))
+    writer = csv.writer(text, delimiter=separator, lineterminator=ending, quoting=quoting)
+    writer.writerow(order)
+    writer.writerows(zip(*(columns[name] for name in order), strict=True))
+    encoding = draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))
+    return text.getvalue().encode(encoding), places
+
+
+def read(file: Path, text: str) -> StreetObjects:
+    """Load a file with the text of a draft."""
+    catalog = file.with_suffix(".toml")
+    catalog.write_text(text, encoding="utf-8")
+    return load(file, catalog=catalog, collapse=False, merge=False).objects
+
+
+def farthest(objects: StreetObjects, places: Sequence[Pair]) -> float:
+    """Return the largest distance of an object to its place in metres, of rows in order."""
+    right = transform_points(np.array(places), "EPSG:4326", objects.crs)
+    return float(np.hypot(*(right - objects.xy).T).max())
+
+
+def test_every_table_is_drafted_and_loaded_to_the_centimetre(tmp_path: Path) -> None:
+    @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    @given(tables())
+    def holds(drawn: tuple[bytes, list[Pair]]) -> None:
+        content, places = drawn
+        file = tmp_path / "street_lights.csv"
+        file.write_bytes(content)
+        objects = read(file, draft_catalog(file))
+        assert len(objects) == len(places)
+        assert farthest(objects, places) < 0.01
+
+    holds()
