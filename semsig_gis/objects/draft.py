@@ -27,6 +27,7 @@ from semsig_gis.core import (
     crs_text,
     require_metric_crs,
     temporary_folder,
+    town_of,
 )
 from semsig_gis.objects.draft_folder import known_sources, need_of, sort_files
 from semsig_gis.objects.draft_layers import LayerDraft, own_classes, shared_layers, snake
@@ -57,9 +58,9 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from semsig_gis.core import AnyCrs
+    from semsig_gis.core import AnyCrs, Town
     from semsig_gis.objects.guesses import Column, LayerSample
-    from semsig_gis.sources import PositionFields
+    from semsig_gis.sources import PositionFields, RawLayer
 
 
 # Any projected CRS, to read coordinates unchanged.
@@ -217,16 +218,26 @@ def _loading(path: Path, drafts: Sequence[LayerDraft], remarks: Sequence[str]) -
     names = _unique(snake(draft.name) for draft in drafts)
     for name, draft in zip(names, drafts, strict=True):
         lines += ["", *_stanza(name, draft, several=in_file[draft.file] > 1, usual=usual)]
-    text = "\n".join(lines) + "\n"
-    _require_loads(text, path)
-    return text
+    lines.insert(1, f"# Its positions are {_town(_loaded(lines, path))}.")
+    return "\n".join(lines) + "\n"
 
 
-def _require_loads(text: str, path: Path) -> None:
-    """Raise SourceError if the file does not load with the draft."""
+def _town(layers: Sequence[RawLayer]) -> Town:
+    """Return the town of the positions of the first layer that has some."""
+    for layer in layers:
+        xy = shapely.get_coordinates(layer.geometry)
+        xy = xy[np.isfinite(xy).all(axis=1)]
+        if len(xy):
+            break
+    return town_of(xy, layer.known_crs)
+
+
+def _loaded(lines: Sequence[str], path: Path) -> tuple[RawLayer, ...]:
+    """Return the layers that are read with a draft; SourceError if the file does not load."""
+    layers: tuple[RawLayer, ...] = ()
     with temporary_folder(Path(tempfile.gettempdir())) as folder:
         file = folder / "draft.toml"
-        file.write_text(text, encoding="utf-8")
+        file.write_text("\n".join(lines), encoding="utf-8")
         try:
             catalog = load_catalog(file)
             layers, _ = read_files(catalog.layers, [path])
@@ -240,7 +251,9 @@ def _require_loads(text: str, path: Path) -> None:
                 f"no catalogue can be drafted for {path}: {str(error).rstrip('.')}."
             ) from error
     if empty:
-        raise SourceError(f"{path} has no layer with positions; give a file that has one.")
+        bad = next((f" ({layer.errors[0]})" for layer in layers if layer.errors), "")
+        raise SourceError(f"{path} has no layer with positions{bad}; give a file that has one.")
+    return layers
 
 
 def _draft(path: Path, sample: LayerSample, crs: str | None) -> LayerDraft:

@@ -211,6 +211,13 @@ def settle_extent(
     deciding = objects or [item.places for item in with_points]
     places = _distinct(np.concatenate([np.empty((0, 2)), *deciding]))
     if not len(places):
+        unreadable = [item for item in layers if item.counts.unreadable > len(item)]
+        if unreadable and unreadable[0].errors:
+            raise EmptyResultError(
+                f"no row has a position that can be read: in layer {unreadable[0].spec.name!r}, "
+                f"{unreadable[0].errors[0]}; correct the file, or name other fields of it in the "
+                "catalogue, in x_field and y_field or in geometry_field."
+            )
         if metric is None:
             raise EmptyResultError(
                 "no layer has a feature with a position; look at the filters and the area."

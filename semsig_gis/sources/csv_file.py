@@ -28,6 +28,7 @@ STATED_SEPARATOR = re.compile(r'\ufeff?"?sep=(.)"?\s*', re.IGNORECASE)
 # Number of lines that show where the table begins.
 FIRST_LINES = 100
 MOST_SHOWN = 40
+DIGITS_FIRST = re.compile(r"[^\W\d_]?\W*\d")
 QUOTED = re.compile(r'["{}=]|\(-?\d|\d\)')  # not in names
 # Values that are no names: a number with decimals, an angle, and a long whole number.
 NO_NAME = re.compile(r"\s*[+-]?\d+(?:[.,]\d+)(?:\D.*)?|\s*\d+\s*[°º].*|\s*\d{5,}\s*", re.DOTALL)
@@ -139,15 +140,16 @@ def open_csv(open_: Callable[[], IO[bytes]], what: str, *, encoding: str | None 
     stated = STATED_SEPARATOR.fullmatch(lines[0]) if lines else None
     marks = stated[1] if stated else SEPARATORS
     first = int(bool(stated))
-    found = [_layout(lines, mark, first) for mark in marks]
-    most = max((len(item.names) for item in found if item.fits), default=0)
     # Titles and comments may stand before the table, and blanks between its columns.
+    plain = [_layout(lines, mark, first) for mark in marks]
     titled = [_layout(lines, mark, first, titles=True) for mark in marks]
-    if any(item.fits and len(item.names) > most for item in titled):
-        found = titled
-    elif not most and (blanks := _layout(lines, BLANK, first, titles=True)).fits:
+    found = [b if b.fits and not a.fits else a for a, b in zip(plain, titled, strict=True)]
+    blanks = _layout(lines, BLANK, first, titles=True)
+    most = max((len(item.names) for item in found if item.fits), default=0)
+    if blanks.fits and len(blanks.names) > most:
         found = [blanks]
-    for item in sorted(found, key=lambda item: (not item.fits, -len(item.names), item.separator)):
+    # At the same number of columns, the table that begins first counts.
+    for item in sorted(found, key=lambda item: (not item.fits, -len(item.names), item[:2][::-1])):
         layouts[item.separator], starts[item.separator] = item.names, item.start
     if not any(name for names in layouts.values() for name in names):
         raise SourceError(
@@ -215,8 +217,8 @@ def _layout(lines: Sequence[str], separator: str, first: int, *, titles: bool = 
 
 
 def _is_value(cell: str, *, blanks: bool) -> bool:
-    """Whether a cell is a value; with `blanks` between the columns, names have no digits."""
-    if blanks and any(map(str.isdecimal, cell)):
+    """Whether a cell is a value; with `blanks` between the columns, also if digits are first."""
+    if blanks and DIGITS_FIRST.match(cell):
         return True
     return bool(NO_NAME.fullmatch(cell) or QUOTED.search(cell) or WELL_KNOWN.fullmatch(cell))
 

@@ -63,6 +63,8 @@ SAMPLE_ROWS = 1_000
 FIRST_VALUES, PLACES = 20, 15
 # Positions of objects are this near to a town, and other orders of the axes mostly are not.
 NEAR_TOWN_KM = 50.0
+# Objects of a city are in it, and others seldom are that far from one.
+IN_TOWN_KM, FAR_FROM_TOWN_KM = 10.0, 15.0
 # Fewer decimals are those of measurements.
 MANY_DECIMALS = re.compile(r"\d[.,]\d{4}")
 FEW_DECIMALS = re.compile(r"\d[.,]\d")
@@ -231,6 +233,7 @@ class _Candidate:
     about: tuple[str, ...] = ()
     fixed: bool = False  # the order of the axes is certain
     precise: bool = False  # as degrees of places are, and small numbers of a plane are not
+    unclear: bool = False  # neither values nor names say the order of the axes
 
 
 def find_positions(
@@ -276,14 +279,12 @@ def _whole_fields(
             continue
         free = [item for item in hits if item.pair and item.order is None]
         fixed = 2 * len(free) < len(hits)
-        if not fixed and order is None and any(item.bracketed for item in free):
-            order = LON_LAT
         places = tuple(item and _xy(item) for item in found)
         degrees = _in_degrees(places)
+        unclear = not fixed and (order is None or name.casefold() == "coordinates")
         if not fixed and order is None:
-            order = (
-                LAT_LON if degrees or _in_degrees(tuple(p and p[::-1] for p in places)) else None
-            )
+            plane = not degrees and not _in_degrees(tuple(p and p[::-1] for p in places))
+            order = LON_LAT if plane or any(item.bracketed for item in free) else LAT_LON
         tokens = {*tokens_of(name)}
         rank = (
             1.0,
@@ -298,7 +299,7 @@ def _whole_fields(
         about_words = tuple(sorted(tokens - hints("frames") - hints("whole")))
         fine = sum(len(MANY_DECIMALS.findall(str(value))) > 1 for value in filled)
         precise = 2 * fine >= len(filled)
-        yield _Candidate(own, places, rank, degrees, about_words, fixed, precise)
+        yield _Candidate(own, places, rank, degrees, about_words, fixed, precise, unclear)
 
 
 def _located(value: object, *, order: AxisOrder | None, o_is_east: bool) -> Located | None:
@@ -509,29 +510,43 @@ def _oriented(best: _Candidate) -> PositionFields:
     """Return the fields of a candidate with x and y as the values say, and what to check."""
     found, places = best.fields, best.places
     turned = tuple(place and place[::-1] for place in places)
-    if not any(places) or best.fixed or _grid_of(places):
+    if not any(places) or _grid_of(places):
         return _with_grid(found, places)
-    if _grid_of(turned):
+    if _grid_of(turned) and not best.fixed:
         return _with_grid(found.exchanged, turned)
     fits = (_in_degrees(places), _in_degrees(turned))
-    questions: tuple[str, ...] = ()
-    if fits == (False, True) and (best.precise or found.field is not None):
-        if found.field is None:
+    if fits == (False, True) and not best.fixed:
+        if found.field is not None:
+            return found.exchanged
+        if best.precise:
             text = f"{found.y} is out of the range of latitudes, so that {found.x} is taken for it"
-            questions = (text,)
-    elif all(fits) and best.precise and _distance(places) > NEAR_TOWN_KM >= _distance(turned):
-        there, here = (
-            min(_towns(some), key=lambda town: town.distance_km) for some in (places, turned)
-        )
-        text = (
-            "longitude and latitude look exchanged: as the name says, they are "
-            f"{there.distance_km:,.0f} km from {there.name} ({there.country}); as read here, they "
-            f"are near {here.name} ({here.country})"
-        )
-        questions = (text,)
-    else:
+            return replace(found.exchanged, questions=(text,))
+    if not (all(fits) and best.precise):
         return _with_grid(found, places)
-    return replace(found.exchanged, questions=questions)
+    return _by_towns(best, turned)
+
+
+def _by_towns(best: _Candidate, turned: Sequence[XY | None]) -> PositionFields:
+    """Return the fields of a candidate in degrees with the axes of which places are near towns."""
+    found = best.fields
+    if not _spread(best.places):
+        return found
+    here, there = _distance(best.places), _distance(turned)
+    as_said, exchanged = (
+        min(_towns(some), key=lambda town: town.distance_km) for some in (best.places, turned)
+    )
+    surely = here > NEAR_TOWN_KM >= there
+    maybe = here > FAR_FROM_TOWN_KM and there <= IN_TOWN_KM
+    if not best.fixed and (surely or (maybe and best.unclear)):
+        question = (
+            f"longitude and latitude look exchanged: as the name says, {as_said}; as read here, "
+            f"{exchanged}"
+        )
+        return replace(found.exchanged, questions=(question,))
+    if surely or maybe or best.unclear:
+        question = f"as read here, {as_said}; with longitude and latitude exchanged, {exchanged}"
+        return replace(found, questions=(question,))
+    return found
 
 
 def _grid_of(places: Sequence[XY | None]) -> str | None:
