@@ -58,7 +58,7 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from semsig_gis.core import AnyCrs, Town
+    from semsig_gis.core import AnyCrs
     from semsig_gis.objects.guesses import Column, LayerSample
     from semsig_gis.sources import PositionFields, RawLayer
 
@@ -218,18 +218,18 @@ def _loading(path: Path, drafts: Sequence[LayerDraft], remarks: Sequence[str]) -
     names = _unique(snake(draft.name) for draft in drafts)
     for name, draft in zip(names, drafts, strict=True):
         lines += ["", *_stanza(name, draft, several=in_file[draft.file] > 1, usual=usual)]
-    lines.insert(1, f"# Its positions are {_town(_loaded(lines, path))}.")
+    lines[1:1] = _towns(_loaded(lines, path))
     return "\n".join(lines) + "\n"
 
 
-def _town(layers: Sequence[RawLayer]) -> Town:
-    """Return the town of the positions of the first layer that has some."""
+def _towns(layers: Sequence[RawLayer]) -> Iterator[str]:
+    """Yield a line on the town of the first layer that has positions."""
     for layer in layers:
         xy = shapely.get_coordinates(layer.geometry)
         xy = xy[np.isfinite(xy).all(axis=1)]
         if len(xy):
-            break
-    return town_of(xy, layer.known_crs)
+            yield f"# Its positions are {town_of(xy, layer.known_crs)}."
+            return
 
 
 def _loaded(lines: Sequence[str], path: Path) -> tuple[RawLayer, ...]:
