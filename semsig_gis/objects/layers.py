@@ -76,6 +76,8 @@ if TYPE_CHECKING:
 
 # Objects of a class at the same place, rounded to this, are one object listed several times.
 SAME_PLACE_M = 0.01
+# Lines or areas of one row with a middle that is farther from all of them get a note.
+PARTS_APART_M = 20.0
 AREA_DIMENSIONS = 2
 
 
@@ -202,6 +204,10 @@ def build_objects(
     duplicates = np.bincount(owner[is_duplicate], minlength=len(parts)).tolist()
     rows = np.flatnonzero(~is_duplicate)
     is_thing = np.isin(codes, [item.code for item in taxonomy.classes if item.shape != "point"])
+    # The middle of lines or areas that lie apart is at none of them.
+    several = np.flatnonzero(~is_thing & (shapely.get_num_geometries(shapes) > 1))
+    gaps = shapely.distance(shapes[several], shapely.points(xy[several]))
+    apart_rows = np.bincount(owner[several[gaps > PARTS_APART_M]], minlength=len(parts)).tolist()
     things, rows = rows[is_thing[rows]], rows[~is_thing[rows]]
     # Collapse objects of a class at the same place, by layer for the classes in `apart`.
     counts = np.ones(len(rows), np.int64)
@@ -219,8 +225,8 @@ def build_objects(
     rows = np.concatenate([rows, things[points.rows]])
     counts = np.concatenate([counts, np.ones(len(points.rows), np.int64)])
     reports = []
-    for layer, part, duplicate_count, remaining_count in zip(
-        layers, parts, duplicates, remaining, strict=True
+    for layer, part, duplicate_count, remaining_count, apart_count in zip(
+        layers, parts, duplicates, remaining, apart_rows, strict=True
     ):
         row_counts = replace(
             layer.counts,
@@ -230,6 +236,12 @@ def build_objects(
             collapsed=len(part.xy) - duplicate_count - remaining_count,
         )
         notes = (*layer.notes, *layer.errors)
+        if apart_count and not layer.spec.tags:
+            note = (
+                f"{apart_count:,} rows have parts that lie apart; each is one object in their "
+                f"middle, more than {PARTS_APART_M:.0f} m from all of them"
+            )
+            notes += (note,)
         reports.append(
             LayerReport(
                 layer.spec.name,
