@@ -27,6 +27,7 @@ SEPARATORS = frozenset({"end", "also"})
 
 # The beginnings of units; a number with a comma that has none may be two numbers.
 _UNITS = r"\s*(?:°|k?m\b|kil|quil|chil|met|mèt|deg|grad|grau)"
+_AND = r"(?:and|und|et|y|e|ed)\b"
 TOKEN = re.compile(
     # A quotation; ' and \u2019 are apostrophes as well.
     r"(?P<text>\"[^\"\n]+\"|[\u201c\u201e][^\u201c-\u201e\n]+[\u201c\u201d]"
@@ -35,7 +36,7 @@ TOKEN = re.compile(
     # A quotation mark that is not closed, and the word after it.
     r"|(?P<open>(?:[\"\u201c\u201e\u00ab]|(?<!\w)['\u2018\u201a])[^\s'\u2019,;!.]+)"
     r"|(?P<tag>[\w:]+ ?= ?(?!\d)[\w:*]+)"
-    rf"|(?P<number>\(\d+\)|(?<!\w)[-+]?\d+(?:\.\d+|(?:,\d+)+(?=\s*(?:[,;.)]|$)|{_UNITS}))?"
+    rf"|(?P<number>\(\d+\)|(?<!\w)[-+]?\d+(?:\.\d+|(?:,\d+)+(?=\s*(?:[,;.)]|$|{_AND})|{_UNITS}))?"
     r"|\d+(?:\.\d+)?)"
     r"|(?P<word>[^\W\d_]+(?:_[^\W\d_]+)*|[°@?])"
     r"|(?P<end>[,;!.\n])"

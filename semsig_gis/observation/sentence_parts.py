@@ -528,7 +528,7 @@ class Part:
             case 0, 0, 0, 1 if 1 <= self.hours[0] <= HOURS:
                 offset = self.hours[0] % HOURS * (FULL_TURN / HOURS)
                 place = {"offset": offset, "bearing_error": HOUR_ERROR}
-        directions = len(turns) + len(degrees) + len(points) + len(self.hours)
+        directions = sum(map(len, self.directions()))
         if place is None or (directions > 1 and (self.either or self.split)):
             if self.fault is not None:
                 return {}

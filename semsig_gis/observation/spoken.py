@@ -192,7 +192,7 @@ def _sentence(things: Sequence[Part], look: Row, taxonomy: Taxonomy) -> Sentence
                 row["bearing_error"] = math.hypot(row.get("bearing_error", 0.0), error)
     return Sentence(
         row={"detections": rows, **({"signs": signs} if signs else {}), **look},
-        notes=tuple(notes),
+        notes=tuple(dict.fromkeys(notes)),
         unplaced=tuple(code for code in unplaced if code != WILDCARD),
         absent=tuple(code for thing, _ in pairs if thing.absent for code in thing.codes),
     )

@@ -245,6 +245,8 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"see": "lamp n"}, "'n' in 'lamp n' is not understood"),
     ({"see": "lamp at 40,80"}, "40,80 is not clear; write 1.5, or '40 and 80'"),
     ({"see": "bench at 42,5, lamp at 80"}, "42,5 is not clear; write 1.5"),
+    ({"see": "bench at NE or E"}, "the direction in 'bench at NE or E' is not clear"),
+    ({"see": "Bäume bei 42,5 und 80"}, "42,5 is not clear"),
     ({"see": "bench = 30"}, "the number 30 in 'bench 30' is not clear"),
     ({"see": "lamp 1,000 m left"}, "the number 1,000 is not clear"),
     ({"see": "trees (3) left"}, "the number (3) is not clear"),
