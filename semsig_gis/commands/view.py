@@ -324,8 +324,9 @@ def _notes(unknown: list[str], tally: Tally) -> Iterator[str]:
     if tally.turned:
         pictures = _many(len(tally.turned), "picture")
         yield f"the boxes of {pictures} are turned as its camera was, because they are not upright"
-    if tally.faulty:
-        yield f"left out: {_many(len(tally.faulty), 'box', 'boxes')}: {tally.faulty[0]}"
+    if tally.faulty_boxes:
+        boxes = _many(len(tally.faulty_boxes), "box", "boxes")
+        yield f"left out: {boxes}: {tally.faulty_boxes[0]}"
     if tally.no_boxes:
         shapes = _many(tally.no_boxes, "shape")
         yield f"left out: {shapes} without a box or an outline of one object"

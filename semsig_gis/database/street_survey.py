@@ -121,6 +121,7 @@ class Survey:
 
     def to_dict(self) -> SurveyRecord:
         """Return the survey as plain values for JSON."""
+        town: Any = asdict(self.town)
         families: list[Any] = [
             {**asdict(item), "added": _record(item.added), "own": _record(item.own)}
             for item in self.families
@@ -132,7 +133,7 @@ class Survey:
             "occlusion": self.occlusion,
             "street_km": self.street_km,
             "radius": self.radius,
-            "town": asdict(self.town),
+            "town": town,
             "families": families,
         }
 

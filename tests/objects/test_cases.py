@@ -76,4 +76,5 @@ def test_every_object_is_in_its_place(case: str, name: str, tmp_path: Path) -> N
 
 def distances(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance of each point to the nearest of other points."""
-    return np.hypot(*(first[:, None] - second[None, :]).transpose(2, 0, 1)).min(axis=1)
+    between = first[:, None] - second[None, :]
+    return np.asarray(np.hypot(*between.transpose(2, 0, 1)).min(axis=1))

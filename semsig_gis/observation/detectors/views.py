@@ -71,7 +71,7 @@ class Tally:
     ranges: int = 0
     below_min_score: int = 0
     no_boxes: int = 0
-    faulty: list[str] = field(default_factory=list)
+    faulty_boxes: list[str] = field(default_factory=list)
     """Why boxes cannot be used."""
     turned: set[str] = field(default_factory=set)
     """Pictures with boxes that were turned with the picture."""
@@ -101,7 +101,7 @@ class Tally:
                 "pictures": dict(self.unusable),
                 "below_min_score": self.below_min_score,
                 "no_boxes": self.no_boxes,
-                "faulty_boxes": len(self.faulty),
+                "faulty_boxes": len(self.faulty_boxes),
                 "no_street_objects": dict(self.no_objects),
                 "unknown_labels": dict(self.unknown),
                 "classes_not_in_city": dict(self.not_in_city),
@@ -382,7 +382,7 @@ class ViewBuilder:
     def _meaning(self, box: Box, tally: Tally) -> Meaning | None:
         """Return the meaning of a box, or count it and return None if it is left out."""
         if box.fault:
-            tally.faulty.append(box.fault)
+            tally.faulty_boxes.append(box.fault)
             return None
         if box.score < self.min_score:
             tally.below_min_score += 1

@@ -300,10 +300,10 @@ def as_text(runs: list[int]) -> str:
     return text
 
 
-MASKS = [
+BENCH_RUNS, SIGN_RUNS = (run_lengths(*item["bbox"]) for item in COCO["annotations"])
+MASKS: list[dict[str, Any]] = [
     {**item, "bbox": None, "segmentation": {"size": [400, 800], "counts": counts}}
-    for item, form in zip(COCO["annotations"], (list, as_text), strict=True)
-    for counts in [form(run_lengths(*item["bbox"]))]
+    for item, counts in zip(COCO["annotations"], (BENCH_RUNS, as_text(SIGN_RUNS)), strict=True)
 ]
 SMALL_TASK = {
     "id": 3,
