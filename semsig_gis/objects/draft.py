@@ -185,10 +185,10 @@ def _drafts(path: Path, crs: str | None) -> tuple[list[LayerDraft], list[str]]:
         fields = items[0].info.fields
         raise SourceError(f"{path} has no layer with positions and {no_positions(fields)}.")
     drafts = [_draft(path, item, crs) for item in layers]
-    remarks = known_sources(path, drafts[0].columns, len(layers[0].rows))
+    remarks = []
     if len(layers) < len(items):
         tables = ", ".join(_text(item.info.name) for item in items if item not in layers)
-        remarks.append(f"Left out, because they have no geometry: {tables}")
+        remarks.append(f"Layers of {path.name} without geometry are left out: {tables}")
     return drafts, remarks
 
 
@@ -203,7 +203,7 @@ def _loading(path: Path, drafts: Sequence[LayerDraft], remarks: Sequence[str]) -
     lines = [
         f"# Draft of a catalogue for {_text(name)}, from its names, fields and values.",
         f"# Check every line; what only a person can know is marked {EDIT}.",
-        *(f"# {_plain(remark)}" for remark in remarks),
+        *(f"# {_plain(remark)}" for remark in (*known_sources(path, drafts), *remarks)),
         "",
         f"name = {_text(snake(title))}",
         f"title = {_text(title)}",
@@ -263,7 +263,8 @@ def _draft(path: Path, sample: LayerSample, crs: str | None) -> LayerDraft:
     rows = len(sample.rows)
     guess = guess_class(names, columns, geometry=geometry, rows=rows)
     candidates = [column for column in columns if column.meant_for("filter") or not guess.sure]
-    class_by = None if guess.is_role else guess_class_by(candidates, guess.name, sure=guess.sure)
+    name = "" if guess.by_values else guess.name
+    class_by = None if guess.is_role else guess_class_by(candidates, name, sure=guess.sure)
     mixed = class_by is not None and _is_mixed(class_by, columns, guess, rows)
     if mixed and not guess.sure:
         guess = ClassGuess()  # a class of its own for other values
@@ -284,7 +285,8 @@ def _is_mixed(
     (counts,) = (column.counts for column in columns if column.name == field)
     rows_named = sum(counts[value] for value in classes)
     others = sum(counts[value] for value, name in classes.items() if name != guess.name)
-    several = len(set(classes.values())) > 1
+    # Of a guess by values, rows with others are not of this class.
+    several = len(set(classes.values())) > 1 or (guess.by_values and rows_named < rows)
     return several and rows_named >= MIN_NAMED * rows and others >= MIN_OTHERS * rows * guess.sure
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from typing import TYPE_CHECKING
 
-from semsig_gis.core import InputError, SemsigError
+from semsig_gis.core import InputError, SemsigError, listed
 from semsig_gis.sources import (
     PICTURES,
     catalog_names,
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from semsig_gis.objects.guesses import Column
+    from semsig_gis.objects.draft_layers import LayerDraft
 
 # Files that accompany a data file of the same name.
 SIDE_SUFFIXES = frozenset(
@@ -78,35 +78,38 @@ def need_of(file: Path) -> str:
     return f"no catalogue is needed ({names[0]}): {command('load', file)}"
 
 
-def known_sources(file: Path, columns: Sequence[Column], rows: int) -> list[str]:
-    """Return a line on each built-in catalogue that may read a file."""
-    lines = []
-    fields = {column.name.casefold() for column in columns}
-    for name in catalog_names():
-        layers = load_catalog(name).layers
-        fits = [
-            spec.name
-            for spec in layers
-            if not spec.tags
-            and matches_pattern(file.name, spec.files)
-            and all(_names(field, spec.aliases) & fields for _, field in spec.fields)
-        ]
-        if fits:
-            layer = " and ".join(fits)
-            lines.append(
-                f"The built-in catalogue {name} has a layer for {file.name} ({layer}): "
-                f"{command('load', file, f'--catalog {name}')}"
-            )
-    tagged = sum(
-        number
-        for column in columns
-        for value, number in column.counts.items()
-        if isinstance(value, str) and tagged_class(column.name, value)
-    )
-    if 2 * tagged >= rows > 0:
+def known_sources(path: Path, drafts: Sequence[LayerDraft]) -> list[str]:
+    """Return a line on each built-in catalogue that may read the files of a file or folder."""
+    files: dict[str, list[str]] = {}
+    with_tags = []
+    for draft in drafts:
+        fields = {column.name.casefold() for column in draft.columns}
+        for name in catalog_names():
+            if any(
+                not spec.tags
+                and matches_pattern(draft.file.name, spec.files)
+                and all(_names(field, spec.aliases) & fields for _, field in spec.fields)
+                for spec in load_catalog(name).layers
+            ):
+                files.setdefault(name, []).append(draft.file.name)
+        tags = sum(
+            number
+            for column in draft.columns
+            for value, number in column.counts.items()
+            if isinstance(value, str) and tagged_class(column.name, value)
+        )
+        if 2 * tags >= len(draft.sample.rows) > 0:
+            with_tags.append(draft.file.name)
+    lines = [
+        f"The built-in catalogue {name} has layers for {listed(list(dict.fromkeys(names)))}: "
+        f"{command('load', path, f'--catalog {name}')}"
+        for name, names in files.items()
+    ]
+    if with_tags:
         lines.append(
-            f"The fields of {file.name} look like tags of OpenStreetMap; then no catalogue of its "
-            f"own is needed: {command('load', file, '--catalog openstreetmap')}"
+            f"Fields look like tags of OpenStreetMap in {listed(list(dict.fromkeys(with_tags)))}; "
+            "if they are, no catalogue is needed but the built-in one: "
+            f"{command('load', path, '--catalog openstreetmap')}"
         )
     return lines
 

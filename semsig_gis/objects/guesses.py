@@ -188,7 +188,8 @@ def columns_of(sample: LayerSample) -> tuple[Column, ...]:
 class ClassGuess:
     """Guessed class of a layer, or its role if `is_role`; the name is empty without a guess.
 
-    `others` are further possible classes; `sure` is whether the guess is certain.
+    `others` are further possible classes; `sure` is whether the guess is certain, and `by_values`
+    whether it is from the values of a field, of which others may name no class.
     """
 
     name: str = ""
@@ -196,6 +197,7 @@ class ClassGuess:
     reason: str = ""
     others: tuple[str, ...] = ()
     sure: bool = False
+    by_values: bool = False
 
 
 def guess_class(
@@ -246,7 +248,8 @@ def _guesses_by_content(columns: Sequence[Column], rows: int) -> Iterator[ClassG
                 example.setdefault(match.name, str(value))
         for name, number in row_counts.most_common(1):
             if number >= MIN_CLASS_SHARE * rows:
-                yield ClassGuess(name, reason=f"from {column.name} = {example[name]}")
+                reason = f"from {column.name} = {example[name]}"
+                yield ClassGuess(name, reason=reason, by_values=True)
     for column in columns:
         for match in keywords("class_fields").find(column.name):
             yield ClassGuess(match.name, reason=f"from the field {column.name}")

@@ -107,6 +107,7 @@ FILES: dict[str, dict[str, list[object]] | list[object] | str] = {
     # Values name other classes: of most rows, of few, or not of all.
     "PlacesReserv.gpkg": {"Type": ["Livraison", "Taxi", "GIG/GIC"] * 3},
     "Places_reserv.gpkg": {"Type": [*["Livraison"] * 9, "Taxi"]},
+    "assets.gpkg": {"Kind": ["Bench", "Bench", "Tree pit"] * 2},
     "furniture.gpkg": {"Kind": ["Bench", "lamp", "Pole", "Thing", None, "Bench, red", "lamp"] * 2},
     # Ids are repeated, or the field has an unusual name.
     "trees.gpkg": {"code": ["a", "a", "b"], "x": [1, 2, 3]},
