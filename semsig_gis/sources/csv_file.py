@@ -190,12 +190,17 @@ def _layout(lines: Sequence[str], separator: str, first: int, *, titles: bool = 
     parsed = [item for item in _rows(lines, separator) if item[0] >= first]
     bad = sum(row is None for _, row in parsed)
     rows = [(number, row) for number, row in parsed if row and any(map(str.strip, row))]
+    blanks = separator == BLANK
+    # A comment is before the names of columns, unless it has these itself.
+    while len(rows) > 1 and rows[0][1][0].lstrip().startswith("#"):
+        if any(_is_value(cell, blanks=blanks) for cell in rows[1][1]):
+            break
+        rows = rows[1:]
     if not rows:
         return _Layout(separator, first, (), fits=False)
     widths = Counter(len(_trimmed(row)) for _, row in rows)
     width = max(widths, key=lambda size: (widths[size], size))
     start, names = rows[0]
-    blanks = separator == BLANK
     for number, row in rows if titles else ():
         cells = [cell for cell in row if cell.strip()]
         size = len(_trimmed(row))

@@ -72,9 +72,13 @@ def _without(tokens: tuple[str, ...], phrase: tuple[str, ...]) -> tuple[str, ...
         longer = len(phrase[-1]) >= WHOLE_WORD_LETTERS and last.startswith(phrase[-1])
         if tuple(others) == phrase[:-1] and (last == phrase[-1] or longer):
             return tokens[:start] + tokens[start + size :]
-    if size == 1 and phrase[0] in {"lat", "lon", "lng", "long"}:
+    glued = {"x": "frames", "y": "frames"} | dict.fromkeys(("lat", "lon", "lng", "long"), "glued")
+    if size == 1 and (kind := glued.get(phrase[0])):
+        words = [
+            word for word in position_words()["hints"][kind] if len(word) > 1 or kind == "glued"
+        ]
         for start, token in enumerate(tokens):
-            for word in position_words()["hints"]["glued"]:
+            for word in words:
                 if token in {word + phrase[0], phrase[0] + word}:
                     return (*tokens[:start], word, *tokens[start + 1 :])
     return None
@@ -112,8 +116,9 @@ def crs_in_name(name: str) -> str | None:
     for size in (3, 2, 1):
         for start in range(len(tokens) - size + 1):
             word = "".join(tokens[start : start + size])
-            if word in position_words()["grid_names"]:
-                return str(position_words()["grid_names"][word])
+            for key in (word, word.lstrip("xy")):
+                if key in position_words()["grid_names"]:
+                    return str(position_words()["grid_names"][key])
     for token in tokens:
         if re.fullmatch(r"[1-9]\d{3,4}", token):
             try:

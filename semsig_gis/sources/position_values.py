@@ -58,7 +58,7 @@ ANGLE = re.compile(
     rf"\s*(?P<after>{WORD})?"
 )
 # The units of an angle as letters.
-NO_LETTER = r"\.?(?![^\W\d_])"
+NO_LETTER = r"\.?(?![^\W\d_]\w)"
 UNITS = re.compile(
     rf"(\d)\s*(?:degrees|degree|degrés|grad|deg|d){NO_LETTER}"
     rf"\s*(?:({PLAIN})\s*(?:minutes|minute|min|m){NO_LETTER})?"

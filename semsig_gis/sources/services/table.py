@@ -130,7 +130,8 @@ def _json(path: Path) -> ServiceTable:
     items, system, has_geometry = content, None, False
     if isinstance(content, dict):
         keys = ("features",) if collection else ("features", "results", "records")
-        items = next((content[key] for key in keys if key in content), None)
+        lists = [item for item in content.values() if _is_records(item)]
+        items = next((content[key] for key in keys if key in content), lists[0] if lists else None)
         has_geometry = "features" in content
         system = _json_crs(content, path)
     records = [ServiceRecord.parse(item) for item in items] if isinstance(items, list) else [""]
@@ -150,6 +151,10 @@ def _json(path: Path) -> ServiceTable:
         empty=not records,
         rest=max(total - len(records), 0) if isinstance(total, int) else 0,
     )
+
+
+def _is_records(item: object) -> bool:
+    return isinstance(item, list) and bool(item) and all(isinstance(row, dict) for row in item)
 
 
 def _json_crs(content: dict[str, Any], path: Path) -> CRS | None:
