@@ -17,6 +17,7 @@ from PIL import Image, ImageOps
 from PIL.ExifTags import GPS, IFD, Base
 
 from semsig_gis.core import FULL_TURN, InputError, extra
+from semsig_gis.observation.detectors.camera import MOST_PIXELS
 from semsig_gis.observation.detectors.pictures import Shot, same_shape
 
 if TYPE_CHECKING:
@@ -198,12 +199,14 @@ def _panorama(image: Image.Image) -> Shot | None:
     numbers = {
         name: number
         for name, value in values.items()
-        if (number := _number(value, least=-math.inf)) is not None
+        if (number := _number(value, least=-MOST_PIXELS)) is not None and number <= MOST_PIXELS
     }
-    full, high = numbers.get("FullPanoWidthPixels", 0.0), numbers.get("FullPanoHeightPixels", 0.0)
+    full = numbers.get("FullPanoWidthPixels", 0.0)
     width = numbers.get("CroppedAreaImageWidthPixels", full)
-    height = numbers.get("CroppedAreaImageHeightPixels", high)
-    has_sizes = full > 0 and min(width, height) > 0
+    # The full panorama is twice as wide as high.
+    usual = full / 2.0 if width == full else width * image.height / image.width
+    height = numbers.get("CroppedAreaImageHeightPixels", usual)
+    has_sizes = min(full, width, height) >= 1
     kind = values.get("ProjectionType", "equirectangular" if has_sizes else "").lower()
     camera = PANORAMAS.get(kind)
     fov, turn, horizon = FULL_TURN, 0.0, None
@@ -214,7 +217,7 @@ def _panorama(image: Image.Image) -> Shot | None:
         left = numbers.get("CroppedAreaLeftPixels", (full - width) / 2.0)
         turn = ((left + width / 2.0) / full - 0.5) * FULL_TURN
         # The rows of a cylinder are counted from the horizon, those of a sphere from its top.
-        middle = high / 2.0 if kind == "equirectangular" else 0.0
+        middle = full / 4.0 if kind == "equirectangular" else 0.0
         if "CroppedAreaTopPixels" in numbers:
             horizon = (middle - numbers["CroppedAreaTopPixels"]) / height
     shot = Shot(camera=camera, fov=fov if camera else None, horizon=horizon)
@@ -247,7 +250,7 @@ def _focal(tags: Any, width: int, height: int) -> float | None:  # noqa: ANN401 
 
 
 def _position(gps: Any) -> tuple[float, float] | None:  # noqa: ANN401 - of any tags
-    """Return latitude and longitude in degrees."""
+    """Return latitude and longitude in degrees, None if they are unknown or out of range."""
     position = []
     pairs = (
         (GPS.GPSLatitude, GPS.GPSLatitudeRef, "S"),
@@ -262,7 +265,9 @@ def _position(gps: Any) -> tuple[float, float] | None:  # noqa: ANN401 - of any 
             return None
         degrees = sum((part or 0.0) / 60**place for place, part in enumerate(numbers))
         position.append(-degrees if _text(gps.get(side)) == below else degrees)
-    return position[0], position[1]
+    latitude, longitude = position
+    in_range = abs(latitude) <= FULL_TURN / 4 and abs(longitude) <= FULL_TURN / 2
+    return (latitude, longitude) if in_range else None
 
 
 def _time(tags: Any, gps: Any) -> str | None:  # noqa: ANN401 - of any tags
