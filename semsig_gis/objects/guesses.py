@@ -18,6 +18,7 @@ from semsig_gis.sources import (
     NO_GEOMETRY,
     POINT,
     SHAPE,
+    SUFFIXES,
     LayerInfo,
     ServiceRecord,
     decimal,
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 
 VECTOR = "vector_file"
 # Files that may be a plain table of records, which GDAL cannot read or reads as text.
-TABLE_SUFFIXES = frozenset({".csv", ".geojson", ".gml", ".json", ".parquet"})
+TABLE_SUFFIXES = SUFFIXES | {".csv", ".geojson", ".gml", ".json"}
 SAMPLE_ROWS = 100_000
 ROLE_GEOMETRY = {"buildings": "polygon", "streets": "line"}
 # Maximum number of distinct values of a field that is offered as a filter.
@@ -82,7 +83,7 @@ def sample_layers(path: Path) -> tuple[LayerSample, ...]:
         )
     layers: tuple[LayerSample, ...] = ()
     try:
-        if suffix != ".parquet":
+        if suffix not in SUFFIXES:
             layers = tuple(
                 LayerSample(VECTOR, info, rows, info.geometry != NO_GEOMETRY, positions)
                 for info, rows, positions in first_rows(path, limit=SAMPLE_ROWS)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
 
-SUFFIXES = frozenset({".geoparquet", ".parquet"})
+SUFFIXES: frozenset[str] = frozenset({".geoparquet", ".parquet"})
 
 
 def column_names(path: Path) -> list[str]:

@@ -61,9 +61,9 @@ def test_identifiers_of_geojson_of_any_type(
     path = tmp_path / "a.geojson"
     path.write_text(json.dumps(collection(features)))
     layer = read(path, id_field="id")
-    found = layer.table["source_id"].tolist()
-    assert found == [str(value) for value in ids][: len(found)]
-    assert layer.counts.read == len(ids) == len(found) + layer.counts.unreadable
+    identifiers = layer.table["source_id"].tolist()
+    assert identifiers == [str(value) for value in ids][: len(identifiers)]
+    assert layer.counts.read == len(ids) == len(identifiers) + layer.counts.unreadable
     assert not layer.counts.unreadable or own == (7, 7)
 
 
@@ -152,11 +152,11 @@ def test_unstated_encoding_of_a_shapefile_is_found(
         at = content.index(b"x" * 20)
         content[at : at + 20] = kind.encode(encoding).ljust(20)
     table.write_bytes(content)
-    guessed, stated = (read(path, id_field=field, encoding=by) for by in (None, encoding))
-    for layer in (guessed, stated):
+    by_guess, by_name = (read(path, id_field=field, encoding=by) for by in (None, encoding))
+    for layer in (by_guess, by_name):
         assert layer.table["source_id"].tolist() == kinds
-    said = f"the encoding is not stated; read as {encoding}"
-    assert [said in note for note in guessed.notes] == [True] * (encoding != "utf-8")
-    assert stated.notes == ()
+    remark = f"the encoding is not stated; read as {encoding}"
+    assert [remark in note for note in by_guess.notes] == [True] * (encoding != "utf-8")
+    assert by_name.notes == ()
     (info,) = list_layers(path)
     assert (info.encoding and info.encoding.encoding) == (None if encoding == "utf-8" else encoding)

@@ -109,9 +109,9 @@ def write_topology(path: Path, rows: Rows) -> None:
 
 
 def write_map(path: Path, rows: Rows) -> None:
-    """Write a saved map of uMap, of which one layer is empty."""
+    """Write a saved map of uMap that has an empty layer, too."""
     features = [feature(point(*place), row) for place, row in zip(places(rows), rows, strict=True)]
-    layers = [{**collection(found), "_umap_options": {"name": "x"}} for found in ([], features)]
+    layers = [{**collection(items), "_umap_options": {"name": "x"}} for items in ([], features)]
     content = {"type": "umap", "geometry": point(9, 9), "properties": {}, "layers": layers}
     path.write_text(json.dumps(content))
 
@@ -459,6 +459,7 @@ WRONG_FILES: list[tuple[str, str, bytes, str]] = [
     ("vector_file", "a.sql", b"SET x;", "`ogr2ogr out.gpkg PG:"),
     ("vector_file", "a.e00", b"EXP", "`ogr2ogr out.gpkg a.e00`"),
     ("vector_file", "a.dbf", b"\3", "give its .shp"),
+    ("vector_file", "a.tab", b"!table", "with .dat, .map and .id"),
     ("vector_file", "a.gdb", b"x", "give the folder"),
     ("vector_file", "a.gpx", GPX, "has 1 tracks and 0 routes, but no waypoints"),
     ("vector_file", "a.topojson", b'{"type": "Topology", "arcs": [1]}', "not whole"),

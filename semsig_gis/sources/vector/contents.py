@@ -27,7 +27,7 @@ from semsig_gis.sources.compression import (
     ratio_too_high,
 )
 from semsig_gis.sources.csv_file import open_csv
-from semsig_gis.sources.paths import file_stamp, is_geodatabase, require_file
+from semsig_gis.sources.paths import FILE_SUFFIXES, file_stamp, is_geodatabase, require_file
 from semsig_gis.sources.vector.by_pyogrio import layer_names
 from semsig_gis.sources.vector.dbf import guess_of
 from semsig_gis.sources.vector.formats import (
@@ -111,15 +111,15 @@ def _archive(path: Path) -> list[Member]:
         str(PurePosixPath(name).parent) for name in names if name.lower().endswith(".gdbtable")
     }
     data = [name for name in usable if PurePosixPath(name).suffix.lower() not in SIDE_SUFFIXES]
-    found = [Member(path, name) for name in (data if data or geodatabases else usable)]
-    found += [_geodatabase(path, folder) for folder in sorted(geodatabases)]
-    if not found:
-        shown = [*names[:MOST_NAMES], *(["..."] if len(names) > MOST_NAMES else [])]
-        raise SourceError(
-            f"archive {path} contains no vector file, only {', '.join(shown) or 'nothing'}; one of "
-            f"{accepted()} is needed."
-        )
-    return found
+    files = [Member(path, name) for name in (data if data or geodatabases else usable)]
+    files += [_geodatabase(path, folder) for folder in sorted(geodatabases)]
+    if files:
+        return files
+    examples = [*names[:MOST_NAMES], *(["..."] if len(names) > MOST_NAMES else [])]
+    readable = next((name for name in names if Path(name).suffix.lower() in FILE_SUFFIXES), None)
+    remedy = f"unpack it and give {readable}" if readable else f"one of {accepted()} is needed"
+    contents = ", ".join(examples) or "nothing"
+    raise SourceError(f"archive {path} contains no vector file, only {contents}; {remedy}.")
 
 
 def _names(path: Path, what: object) -> list[str]:
@@ -180,10 +180,21 @@ def _prepared(member: Member) -> Iterable[Member]:
         return _from_workbook(member)
     if member.driver == GPX:
         return [_waypoints(member)]
+    if member.path.suffix.lower() == ".tab":
+        _require_parts(member)
     if member.driver == SHAPEFILE:
         member = member if member.sibling(".shx") else _indexed(member)
         return [replace(member, guess=guess_of(member))]
     return [member]
+
+
+def _require_parts(member: Member) -> None:
+    """Raise SourceError if a file of a MapInfo table is missing."""
+    if member.sibling(".map") is None or not (member.sibling(".dat") or member.sibling(".dbf")):
+        raise SourceError(
+            f"{member} is only a part of a MapInfo table; put the files of the same name that end "
+            "with .dat, .map and .id into its folder."
+        )
 
 
 def _waypoints(member: Member) -> Member:
@@ -293,7 +304,7 @@ def _from_workbook(member: Member) -> list[Member]:
             sheets.append(replace(member, layer=name, copy=table))
     if not sheets:
         raise SourceError(f"{member} has no sheet with rows; give a table with a row of names.")
-    # A sheet of remarks, or without a header, is left out beside others.
+    # A sheet of remarks, or without a header, is left out if there are others.
     return [sheet for sheet in sheets if _is_table(sheet)] or sheets
 
 

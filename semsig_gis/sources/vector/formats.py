@@ -89,7 +89,7 @@ DUMP = (
     "is a dump of a database; load it into PostGIS with psql or pg_restore, write the table with "
     '`ogr2ogr out.gpkg PG:"dbname=NAME" TABLE`, and give out.gpkg'
 )
-PART_OF_SHAPEFILE = "is a part of a shapefile; give its .shp, which needs the other parts beside it"
+PART_OF_SHAPEFILE = "is a part of a shapefile; give its .shp, with the other parts in its folder"
 PROJECT = "is a project, which only names the files of its layers; give these files"
 # What a file of another format is and what to do, by its suffix.
 OTHERS = {
@@ -171,7 +171,7 @@ def suffix_error(file: Path) -> SourceError:
 
 
 def content_error(what: object, start: bytes) -> SourceError:
-    """Return the error for a file whose first bytes do not match its suffix."""
+    """Return the error for a file with first bytes that do not match its suffix."""
     suffix = PurePosixPath(str(what).partition(" in ")[0]).suffix.lower()
     if not start.strip(b"\0"):
         remedy = "it is empty; download it again"

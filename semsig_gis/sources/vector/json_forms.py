@@ -30,7 +30,7 @@ def converted(text: str) -> Mapping[str, Sequence[Mapping[str, Any]]] | None:
     text without names has the name "". Records are features, or are plain. ValueError if a known
     form is damaged.
     """
-    if COLLECTION.match(text):
+    if COLLECTION.match(text) and text.count('"FeatureCollection"') == 1:
         return None
     try:
         document = parse_json(text)

@@ -113,13 +113,13 @@ class Member:
 
     def sibling(self, suffix: str) -> Member | None:
         """Return the file of the same name with another suffix in any case, or None."""
-        wanted = self.path.with_suffix(suffix).name.casefold()
+        target = self.path.with_suffix(suffix).name.casefold()
         if isinstance(self.path, Path):
-            files = (file for file in self.path.parent.iterdir() if file.name.casefold() == wanted)
+            files = (file for file in self.path.parent.iterdir() if file.name.casefold() == target)
             return next((Member(file, None) for file in files), None)
         with zipfile.ZipFile(self.file) as archive:
             names = map(PurePosixPath, archive.namelist())
-        same = (name for name in names if name.name.casefold() == wanted)
+        same = (name for name in names if name.name.casefold() == target)
         return next(
             (Member(self.file, str(name)) for name in same if name.parent == self.path.parent), None
         )
