@@ -45,7 +45,7 @@ def detect_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple
     names: list[str] = []
     lines: list[str] = []
     for path in map(Path, paths):
-        if not is_folder(path):
+        if not path.is_dir():
             require_file(path, "a file or a folder of files")
         files = files_in(path) if is_folder(path) else [path]
         for file in files or [path]:

@@ -26,6 +26,7 @@ from semsig_gis.sources.positions import (
 from semsig_gis.sources.rows import WGS84, BadFeatureError, LayerBuilder
 from semsig_gis.sources.services.table import ServiceRecord, open_table
 from semsig_gis.sources.vector import file as vector_file
+from semsig_gis.sources.vector.formats import ARCHIVES, CSV, DRIVERS, GEOJSON
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -163,7 +164,9 @@ class PositionReader:
 
 
 # Files that other programs make from the data of a service.
-VECTOR_SUFFIXES = frozenset({".fgb", ".gpkg", ".shp", ".zip"})
+VECTOR_SUFFIXES = ARCHIVES | {
+    suffix for suffix, driver in DRIVERS.items() if driver not in {CSV, GEOJSON}
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
