@@ -162,7 +162,7 @@ class Build:
 
         from semsig_gis.core import GridSpec, SignatureSpec
         from semsig_gis.database import TileSpec, ViewpointSpec, build_tiles
-        from semsig_gis.objects import ground_file, open_objects, read_area
+        from semsig_gis.objects import ground_file, open_objects, other_run, read_area
         from semsig_gis.storage import EMPTY_BOX, bounds_by_group
 
         ground_files = {role: ground_file(self.objects, role) for role in ROLES}
@@ -190,6 +190,12 @@ class Build:
         if near is not None:
             defaults = self._in_place(defaults, objects.crs, near, reporter)
         ground = {role: getattr(self, role) for role in ROLES} | defaults
+        for role, path in ground.items():
+            if path is not None and other_run(path, self.objects):
+                reporter.remark(
+                    f"the {role} of {path} are of another run of semsig load than "
+                    f"{self.objects}; if that is not on purpose, load the street objects again"
+                )
         mode = self.viewpoints or ("all" if ground["buildings"] is None else "outdoor")
         polygons = None
         if self.area is not None:

@@ -118,7 +118,7 @@ class Demo:
     ) -> tuple[Any, dict[str, Any], Any]:
         """Return the street objects, the buildings and streets, and the database of a town."""
         from semsig_gis.database import ViewpointSpec, build_database
-        from semsig_gis.objects import build_objects, save_ground, save_objects
+        from semsig_gis.objects import build_objects, save_with_ground
         from semsig_gis.sources import (
             CitySpec,
             paper_taxonomy,
@@ -131,8 +131,9 @@ class Demo:
         objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
         houses, streets = (layer.table for layer in synthetic_surroundings(spec))
         objects_file = self.out / "objects.parquet"
-        save_ground(objects_file, buildings=houses, streets=streets, remark=reporter.remark)
-        save_objects(objects, objects_file)
+        save_with_ground(
+            objects, objects_file, buildings=houses, streets=streets, remark=reporter.remark
+        )
         surroundings = {"footprints": houses, "streets": streets}
         database = build_database(
             objects, viewpoints=ViewpointSpec(mode="streets"), progress=advance, **surroundings

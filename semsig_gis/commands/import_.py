@@ -61,7 +61,7 @@ class Import:
         """Write the database; return its file and its number of cells."""
         from semsig_gis.database import save_database
         from semsig_gis.evaluation import save_identifiability
-        from semsig_gis.objects import save_ground, save_objects
+        from semsig_gis.objects import save_with_ground
         from semsig_gis.output import read_geopackage
 
         contents = read_geopackage(self.geopackage)
@@ -77,8 +77,10 @@ class Import:
         }
         files = {"signature database": self.out}
         if self.objects is not None and contents.objects is not None:
-            save_ground(self.objects, remark=reporter.remark)  # a GeoPackage has none
-            save_objects(contents.objects, self.objects, keep_order=True)
+            # A GeoPackage has no ground, and that of earlier objects is removed.
+            save_with_ground(
+                contents.objects, self.objects, keep_order=True, remark=reporter.remark
+            )
             values |= {"objects": str(self.objects), "street_objects": len(contents.objects)}
             files["street objects"] = self.objects
         save_database(contents.database, self.out)

@@ -191,14 +191,7 @@ class LoadOptions:
     def save(self, loaded: street_objects.Loaded) -> Result:
         """Write the objects and their surroundings; return their quality report."""
         notes = list(loaded.notes)
-        ground = street_objects.save_ground(
-            self.out,
-            buildings=loaded.buildings if self.ground and self.buildings is None else None,
-            streets=loaded.streets if self.ground and self.streets is None else None,
-            remark=notes.append,
-        )
-        street_objects.save_objects(loaded.objects, self.out)
-        files = {"street objects": self.out} | ground
+        files, others = {"street objects": self.out}, {}
         for what, table, path in (
             ("buildings", loaded.buildings, self.buildings),
             ("streets", loaded.streets, self.streets),
@@ -206,8 +199,16 @@ class LoadOptions:
             if path is not None and (table is None or table.empty):
                 notes.append(f"there are no {what} in what was loaded, so {path} is not written")
             elif path is not None:
-                street_objects.save_surroundings(table, path)
+                others[path] = table
                 files[what] = path
+        files |= street_objects.save_with_ground(
+            loaded.objects,
+            self.out,
+            buildings=loaded.buildings if self.ground and self.buildings is None else None,
+            streets=loaded.streets if self.ground and self.streets is None else None,
+            others=others,
+            remark=notes.append,
+        )
         report = street_objects.quality_report(
             loaded.objects, loaded.report, loaded.conflation, notes=notes
         )

@@ -50,7 +50,7 @@ class Synthesize:
 
     def run(self, reporter: Reporter) -> Result:
         """Write the city; return its files."""
-        from semsig_gis.objects import build_objects, save_ground, save_objects
+        from semsig_gis.objects import build_objects, save_with_ground
         from semsig_gis.sources import (
             PARIS_LIKE,
             CitySpec,
@@ -67,12 +67,12 @@ class Synthesize:
             surroundings = synthetic_surroundings(spec)
         objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
         path = self.out / "objects.parquet"
-        ground = save_ground(
+        ground = save_with_ground(
+            objects,
             path,
             **{layer.spec.role: layer.table for layer in surroundings},
             remark=reporter.remark,
         )
-        save_objects(objects, path)
         files = {"street objects": path} | ground
         return Result(
             values=lambda: {"objects": len(objects), "files": [*map(str, files.values())]},

@@ -28,7 +28,6 @@ from .file import PartitionedDatabase as PartitionedDatabase
 from .file import cells_checksum as cells_checksum
 from .file import database_of as database_of
 from .file import database_specs as database_specs
-from .file import digest as digest
 from .file import open_database as open_database
 from .file import open_dataset as open_dataset
 from .file import part_files as part_files

@@ -26,7 +26,6 @@ from semsig_gis.database.file import (
     INPUTS,
     KIND,
     Manifest,
-    digest,
     is_folder,
     open_database,
     open_dataset,
@@ -45,7 +44,7 @@ from semsig_gis.database.store import (
     names_in,
     open_store,
 )
-from semsig_gis.storage import read_geoparquet, whole_folder, write_geoparquet
+from semsig_gis.storage import digest, read_geoparquet, whole_folder, write_geoparquet
 
 if TYPE_CHECKING:
     from collections.abc import Callable

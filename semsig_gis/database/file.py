@@ -28,6 +28,7 @@ from semsig_gis.core import (
 from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
 from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.storage import (
+    digest,
     geo_metadata,
     parse_json,
     points_to_wkb,
@@ -55,7 +56,6 @@ EXTENTS = "extents"
 MANIFEST = "_manifest.json"
 INPUTS = "_inputs"  # copies of the objects, buildings and streets of a database in parts
 PARTS_KIND = "signature database in parts"
-CHUNK = 1 << 20
 
 
 def save_database(database: SignatureDatabase, path: str | Path) -> None:
@@ -188,7 +188,7 @@ def database_of(
 
     Raise DatabaseError, with `path`, if they are damaged or from another version.
     """
-    if specs.get("format") not in {PLAIN_FORMAT, FORMAT}:
+    if specs.get("format") not in (PLAIN_FORMAT, FORMAT):  # in a set, a list would be an error
         raise DatabaseError(
             f"{path} was written by another version of semsig ({specs.get('version')}); "
             "build the database again."
@@ -289,16 +289,6 @@ def cells_checksum(database: SignatureDatabase) -> str:
     for array in (database.columns, database.rows, database.offsets, *seen):
         checksum.update(np.ascontiguousarray(array).data)
     return checksum.hexdigest()
-
-
-def digest(*paths: Path) -> str:
-    """Return the hexadecimal SHA-256 digest of the contents of files, in their order."""
-    total = hashlib.sha256()
-    for path in paths:
-        with path.open("rb") as file:
-            while chunk := file.read(CHUNK):
-                total.update(chunk)
-    return total.hexdigest()
 
 
 def damaged_files(folder: Path, digests: Mapping[str, str]) -> list[str]:

@@ -35,7 +35,6 @@ from semsig_gis.core import (
 from semsig_gis.database.file import (
     INPUTS,
     damaged_files,
-    digest,
     is_folder,
     read_manifest,
     read_specs,
@@ -49,6 +48,7 @@ from semsig_gis.objects import licenses_of, open_objects, save_objects
 from semsig_gis.storage import (
     EMPTY_BOX,
     UNREADABLE,
+    digest,
     move_folder,
     parse_json,
     read_whole,

@@ -16,9 +16,9 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core import HALF_WIDTH, SourceError, temporary_folder
-from semsig_gis.database.file import INPUTS, digest
+from semsig_gis.database.file import INPUTS
 from semsig_gis.objects import open_objects, read_surroundings, save_objects, save_surroundings
-from semsig_gis.storage import EMPTY_BOX, VERIFY_CHECKSUMS, whole_file
+from semsig_gis.storage import EMPTY_BOX, VERIFY_CHECKSUMS, digest, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

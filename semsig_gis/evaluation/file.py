@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from pathlib import Path
@@ -21,13 +22,14 @@ from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
 from semsig_gis.localization import noise_from_dict, parse_method
 from semsig_gis.storage import (
     UNREADABLE,
+    digest,
     geo_metadata,
     parse_json,
     read_geoparquet,
     read_whole,
     require_kinds,
+    whole_files,
     write_geoparquet,
-    write_whole,
 )
 
 if TYPE_CHECKING:
@@ -52,6 +54,8 @@ CHANCES = (
     *(name for name in QUERY_COLUMNS if name[0] == "p" or name.startswith("near")),
     *("chance", "right", "in_region"),
 )
+RUN = "run"
+"""Key of the digest of the queries in the other files."""
 QUERIES, SUMMARY, TIMING = "queries.parquet", "evaluation.json", "timing.json"
 
 
@@ -95,12 +99,15 @@ def save_evaluation(evaluation: Evaluation, folder: str | Path) -> None:
         "versions": dict(evaluation.versions),
     }
     geo = geo_metadata(points.crs, geometry_types=["Point"], bounds=points.total_bounds)
-    write_geoparquet(table, Path(folder) / QUERIES, geo=geo, specs=specs)
     summary: dict[str, Any] = {**evaluation.summary()}
     timing = summary.pop("timing")
-    for name, content in ((SUMMARY, summary), (TIMING, timing)):
-        text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
-        write_whole(Path(folder) / name, text + "\n")
+    files = [Path(folder) / name for name in (QUERIES, SUMMARY, TIMING)]
+    with whole_files(*files) as (queries, *others):
+        write_geoparquet(table, queries, geo=geo, specs=specs)
+        run = digest(queries)
+        for partial, content in zip(others, (summary, timing), strict=True):
+            text = json.dumps({**content, RUN: run}, indent=2, allow_nan=False, ensure_ascii=False)
+            partial.write_text(text + "\n", encoding="utf-8")
 
 
 def open_evaluation(folder: str | Path) -> Evaluation:
@@ -139,7 +146,9 @@ def open_evaluation(folder: str | Path) -> Evaluation:
         points = gpd.GeoSeries.from_wkb(frame.pop("geometry"), crs=crs)
         frame["best_cell_id"] = frame["best_cell_id"].astype("Int64")
         method, query_spec = settings_from_dict(specs)
-        timing = parse_json(read_whole(times), finite=True) if times.exists() else {}
+        timing = _of_run(times, run := digest(file))
+        with contextlib.suppress(OSError, TypeError, ValueError):  # only people read it
+            _of_run(file.with_name(SUMMARY), run)
         seconds = timing.get("seconds_per_query")
         return Evaluation(
             queries=gpd.GeoDataFrame(frame, geometry=points),
@@ -154,6 +163,20 @@ def open_evaluation(folder: str | Path) -> Evaluation:
         )
     except (*UNREADABLE, shapely.errors.ShapelyError) as error:
         raise DatabaseError(f"{file} is damaged ({error}); evaluate again.") from error
+
+
+def _of_run(path: Path, run: str) -> dict[str, Any]:
+    """Return the values of a file next to the queries, if it exists.
+
+    DatabaseError if it is of another run, TypeError or ValueError if it cannot be read.
+    """
+    values = dict(parse_json(read_whole(path), finite=True)) if path.exists() else {}
+    if values.get(RUN, run) != run:
+        raise DatabaseError(
+            f"{path} is of another run than {QUERIES} next to it, perhaps of one that was "
+            "interrupted; evaluate again, or remove it."
+        )
+    return values
 
 
 def _check(table: pa.Table, specs: dict[str, Any]) -> None:

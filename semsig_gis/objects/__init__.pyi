@@ -35,10 +35,11 @@ from .skipped_layers import layers_in_same_extracts as layers_in_same_extracts
 from .skipped_layers import read_small_layers as read_small_layers
 from .surroundings import covers_place as covers_place
 from .surroundings import ground_file as ground_file
+from .surroundings import other_run as other_run
 from .surroundings import read_area as read_area
 from .surroundings import read_surroundings as read_surroundings
-from .surroundings import save_ground as save_ground
 from .surroundings import save_surroundings as save_surroundings
+from .surroundings import save_with_ground as save_with_ground
 from .surroundings import select_role as select_role
 from .table import Licence as Licence
 from .table import StreetObjects as StreetObjects

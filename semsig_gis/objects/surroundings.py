@@ -13,7 +13,7 @@ from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 
 from semsig_gis.core import CLASS_NAME, HALF_WIDTH, LICENSES, NAME, InputError, SourceError
-from semsig_gis.objects.table import layer_licences
+from semsig_gis.objects.table import layer_licences, save_objects
 from semsig_gis.sources import (
     NUMBERS,
     SUFFIXES,
@@ -39,22 +39,27 @@ from semsig_gis.storage import (
     GROUP_ROWS,
     WRITE_CHECKSUMS,
     add_footer_checksum,
+    digest,
     hilbert_order,
     parse_json,
     require_regular,
     whole_file,
+    whole_files,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     import geopandas as gpd
 
     from semsig_gis.core import AnyCrs
+    from semsig_gis.objects.table import StreetObjects
     from semsig_gis.sources import GeometryKind, RawLayer
 
 GROUND = "semsig_ground"
-"""Key in the `attrs` of files by `save_ground`, which may be removed with the street objects."""
+"""Key in the `attrs` of ground files of `save_with_ground`, which it may remove again."""
+RUN = "semsig_objects"
+"""Key in the `attrs`: name and digest of the file of street objects that was written with them."""
 NEAR_M = 1000.0
 """Distance from the street objects of a city to its buildings and streets."""
 FAR_M = 10_000.0
@@ -96,7 +101,8 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
 def _save(table: gpd.GeoDataFrame, path: str | Path, marks: dict[str, Any]) -> None:
     """Save buildings or streets with some more `attrs`."""
     ordered = table.iloc[hilbert_order(table.bounds.to_numpy())]
-    ordered.attrs = {key: table.attrs[key] for key in table.attrs if key != GROUND} | marks
+    kept = {key: table.attrs[key] for key in table.attrs if key not in {GROUND, RUN}}
+    ordered.attrs = kept | marks
     with whole_file(path) as partial:
         ordered.to_parquet(
             partial,
@@ -165,48 +171,71 @@ def ground_file(objects: str | Path, role: Literal["buildings", "streets"]) -> P
     return Path(objects).with_suffix(f".{role}.parquet")
 
 
-def save_ground(
-    objects: str | Path,
+def save_with_ground(
+    objects: StreetObjects,
+    path: str | Path,
     *,
     buildings: gpd.GeoDataFrame | None = None,
     streets: gpd.GeoDataFrame | None = None,
+    others: Mapping[Path, gpd.GeoDataFrame] | None = None,
+    keep_order: bool = False,
     remark: Callable[[str], None],
 ) -> dict[str, Path]:
-    """Save buildings and streets next to a file of street objects; return their files by role.
+    """Save street objects with buildings and streets next to them; return their files by role.
 
-    Files of earlier objects of that name are removed (see `ground_file`). InputError, and nothing
-    is written, if a file would be replaced that was not written by this function; where there is
+    Files of earlier objects of that name are removed (see `ground_file`). `others` are tables of
+    buildings and streets by the file to write. No file is replaced before all are written, and
+    all carry the digest of the street objects (see `other_run`). InputError, and nothing is
+    written, if a file would be replaced that was not written by this function; where there is
     nothing to write, such a file is left. `remark` is called with notes on such files.
     """
     roles: dict[Literal["buildings", "streets"], gpd.GeoDataFrame | None] = {
         "buildings": buildings,
         "streets": streets,
     }
-    paths = {role: ground_file(objects, role) for role in roles}
+    paths = {role: ground_file(path, role) for role in roles}
     present = [role for role in roles if paths[role].exists()]
     foreign = [role for role in present if not _is_ground(paths[role])]
     written: dict[str, Path] = {
         role: paths[role] for role, table in roles.items() if table is not None and len(table)
     }
-    if others := [str(paths[role]) for role in foreign if role in written]:
+    if blocked := [str(paths[role]) for role in foreign if role in written]:
         raise InputError(
-            f"{' and '.join(others)} would be replaced, but semsig did not write it as part of "
-            f"{objects}; rename it, write to another file, or give --no-ground."
+            f"{' and '.join(blocked)} would be replaced, but semsig did not write it as part of "
+            f"{path}; rename it, write to another file, or give --no-ground."
         )
+    tables = [
+        *((paths[role], table, True) for role, table in roles.items() if role in written),
+        *((file, table, False) for file, table in (others or {}).items()),
+    ]
+    with whole_files(path, *(file for file, _, _ in tables)) as (first, *partials):
+        save_objects(objects, first, keep_order=keep_order)
+        run = [Path(path).name, digest(first)]
+        for partial, (_, table, is_ground) in zip(partials, tables, strict=True):
+            _save(table, partial, {RUN: run, **({GROUND: True} if is_ground else {})})
     for role in present:
         if role in foreign:
-            remark(f"{paths[role]} was not written by semsig with {objects}, and is left as it is")
+            remark(f"{paths[role]} was not written by semsig with {path}, and is left as it is")
         elif role not in written:
             paths[role].unlink()
             remark(f"{paths[role]}, of earlier objects, was removed")
-    for role, table in roles.items():
-        if role in written:
-            _save(table, written[role], {GROUND: True})
     return written
 
 
+def other_run(path: str | Path, objects: str | Path) -> bool:
+    """Whether a file was written with a file of the same name as `objects`, but other content.
+
+    So it is of another run, perhaps of one that was interrupted.
+    """
+    try:
+        name, expected = _metadata(path, b"PANDAS_ATTRS")[RUN]
+    except (pa.ArrowException, OSError, LookupError, TypeError, ValueError):
+        return False
+    return bool(name == Path(objects).name and expected != digest(Path(objects)))
+
+
 def _is_ground(path: Path) -> bool:
-    """Whether a file was written by `save_ground`."""
+    """Whether a file was written by `save_with_ground` as ground."""
     try:
         return GROUND in _metadata(path, b"PANDAS_ATTRS")
     except (pa.ArrowException, OSError, LookupError, TypeError, ValueError):

@@ -15,9 +15,9 @@ from pystac.extensions.projection import ProjectionExtension
 from shapely.geometry import box, mapping
 
 from semsig_gis.core import to_degrees
-from semsig_gis.database import database_specs, digest
+from semsig_gis.database import database_specs
 from semsig_gis.output.layers.cells import cells_layer
-from semsig_gis.storage import write_whole
+from semsig_gis.storage import digest, write_whole
 
 if TYPE_CHECKING:
     from semsig_gis.database import City

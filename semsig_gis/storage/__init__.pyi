@@ -36,6 +36,7 @@ from .rows import row_value as row_value
 from .rows import scan_rows as scan_rows
 from .runs import PARTIAL as PARTIAL
 from .runs import RunKind as RunKind
+from .runs import digest as digest
 from .runs import finish as finish
 from .runs import partial_folder as partial_folder
 from .runs import read_json as read_json

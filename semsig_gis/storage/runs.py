@@ -8,6 +8,7 @@ step.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
 import shutil
@@ -26,6 +27,21 @@ if TYPE_CHECKING:
     """Parameters of a run as plain JSON values by name."""
 
 PARTIAL = ".partial"
+CHUNK = 1 << 20
+
+
+def digest(*paths: Path) -> str:
+    """Return the hexadecimal SHA-256 digest of the contents of files, in their order.
+
+    That of one file of a run is the name of the run in its other files, so that readers notice
+    files of different runs, which an interruption may leave.
+    """
+    total = hashlib.sha256()
+    for path in paths:
+        with path.open("rb") as file:
+            while chunk := file.read(CHUNK):
+                total.update(chunk)
+    return total.hexdigest()
 
 
 @dataclass(frozen=True, kw_only=True)

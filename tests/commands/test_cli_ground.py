@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import errno
 import json
+import os
 from typing import TYPE_CHECKING
 
 import geopandas as gpd
@@ -13,7 +16,7 @@ from sentences import sentence
 
 from semsig_gis.core import LICENSES
 from semsig_gis.database import open_city, open_store
-from semsig_gis.objects import read_surroundings, save_surroundings
+from semsig_gis.objects import open_objects, read_surroundings, save_objects, save_surroundings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -293,3 +296,36 @@ def test_exchanged_latitude_and_longitude_of_a_position_are_noticed(
 def test_box_with_latitude_first_that_is_none_is_noticed(run: Run, town: Path) -> None:  # noqa: ARG001
     line = f"{LOAD} --clip=-33.9,151.1,-33.8,151.3"
     sentence(run(line), "is not an area", "exchanged", "151.1,-33.9,151.3,-33.8")
+
+
+def test_files_of_another_run_of_load_are_remarked(town: Path, run: Run, run_ok: RunOk) -> None:
+    run_ok(f"{LOAD} --buildings own.parquet")
+    old = [(town / name).read_bytes() for name in ("own.parquet", GROUND[1])]
+    build = "build town.parquet --out city.parquet --buildings own.parquet"
+    assert "another run" not in run(build)[2]
+    objects = open_objects(town / "town.parquet")
+    save_objects(dataclasses.replace(objects, table=objects.table[:-1]), town / "town.parquet")
+    code, _, err = run(build)
+    assert code == 0
+    for role, name in (("buildings", "own.parquet"), ("streets", GROUND[1])):
+        assert f"the {role} of {name} are of another run of semsig load than town.parquet" in err
+    (town / "town.parquet").rename(town / "mine.parquet")  # not what they were written with
+    assert "another run" not in run(f"{build.replace('town', 'mine')} --streets {GROUND[1]}")[2]
+    run_ok(f"{LOAD} --buildings own.parquet")
+    assert [(town / name).read_bytes() for name in ("own.parquet", GROUND[1])] == old
+
+
+def test_a_full_disk_leaves_all_files_of_load(
+    town: Path, run: Run, run_ok: RunOk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_ok(f"{LOAD} --buildings own.parquet")
+    before = {path: path.read_bytes() for path in town.glob("*.parquet")}
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    for name in ("save_objects", "_save"):
+        with monkeypatch.context() as patch:
+            patch.setattr(f"semsig_gis.objects.surroundings.{name}", full)
+            sentence(run(f"{LOAD} --buildings own.parquet"), "No space left", "unchanged")
+        assert {path: path.read_bytes() for path in town.glob("*.parquet")} == before

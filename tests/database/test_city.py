@@ -27,7 +27,6 @@ from semsig_gis.database import (
     build,
     build_database,
     built_digest,
-    digest,
     open_city,
     open_database,
     open_store,
@@ -46,7 +45,7 @@ from semsig_gis.objects import (
     open_objects,
     save_objects,
 )
-from semsig_gis.storage import whole_file
+from semsig_gis.storage import digest, whole_file
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -23,12 +23,12 @@ from semsig_gis.database import (
     Manifest,
     PartFile,
     describe_part,
-    digest,
     open_database,
     open_dataset,
     read_manifest,
     save_database,
 )
+from semsig_gis.storage import digest
 
 if TYPE_CHECKING:
     from collections.abc import Callable

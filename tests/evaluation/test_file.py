@@ -9,9 +9,10 @@ import pytest
 from geopandas.testing import assert_geodataframe_equal
 from hypothesis import given
 from hypothesis import strategies as st
+from late_failures import failures
 from noisy_cells import noise_specs, random_database
 from pandas.testing import assert_frame_equal
-from sentences import refused
+from sentences import assert_sentence, refused
 
 from semsig_gis.core import DatabaseError, InputError
 from semsig_gis.evaluation import (
@@ -28,7 +29,7 @@ from semsig_gis.evaluation import (
     used_noises,
 )
 from semsig_gis.localization import EditWeights, LikelihoodMethod, Method, NoiseSpec
-from semsig_gis.storage import read_geoparquet, write_geoparquet
+from semsig_gis.storage import digest, read_geoparquet, write_geoparquet
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -88,6 +89,8 @@ def test_json_files_are_strict_json(tmp_path: Path) -> None:
         json.loads((tmp_path / name).read_text(encoding="utf-8"), parse_constant=pytest.fail)
         for name in ("evaluation.json", "timing.json")
     )
+    run = digest(tmp_path / "queries.parquet")
+    assert (summary.pop("run"), timing.pop("run")) == (run, run)
     assert summary | {"timing": timing} == EVALUATION.summary()
     assert timing["seconds_per_query"] == EVALUATION.seconds_per_query
     assert timing["machine"] == machine()
@@ -97,6 +100,35 @@ def test_json_files_are_strict_json(tmp_path: Path) -> None:
     assert summary["database"]["cells"] == 150
     assert summary["results"]["recall_at_percent"]["10"] == EVALUATION.recall(10)
     assert summary["versions"].keys() == {"semsig_gis", "python", "numpy", "pandas", "rapidfuzz"}
+
+
+def test_files_of_different_runs_are_refused(tmp_path: Path) -> None:
+    """As an interruption between two renames leaves them."""
+    save_evaluation(EVALUATION, tmp_path)
+    save_evaluation(replace(EVALUATION, top=2), tmp_path / "other")
+    for name in ("evaluation.json", "timing.json"):
+        own = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_bytes((tmp_path / "other" / name).read_bytes())
+        with refused(DatabaseError, name, "of another run", "evaluate again"):
+            open_evaluation(tmp_path)
+        (tmp_path / name).write_bytes(own)
+    for name in ("evaluation.json", "timing.json"):
+        (tmp_path / name).unlink()
+    assert len(open_evaluation(tmp_path).queries) == len(EVALUATION.queries)
+
+
+def test_files_of_two_runs_are_never_read_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whichever system call fails: the old evaluation, the new one, or none of the two is read."""
+    new, folder = replace(EVALUATION, top=2), tmp_path / "results"
+    for run in failures(monkeypatch, exchange=True, every=2):
+        save_evaluation(EVALUATION, folder)
+        error = run(lambda: save_evaluation(new, folder))
+        try:
+            assert open_evaluation(folder).top == (1 if error else 2)
+        except DatabaseError as mixed:
+            assert_sentence(mixed, "of another run")
 
 
 def test_missing_and_damaged_files_are_refused(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from semsig_gis.core import SourceError
-from semsig_gis.database import City, digest
+from semsig_gis.database import City
 from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.queries.draw import check_count, draw_queries
 from semsig_gis.evaluation.scoring import make_evaluation, score_queries, scored_tables
@@ -27,6 +27,7 @@ from semsig_gis.storage import (
     VERIFY_CHECKSUMS,
     add_footer_checksum,
     check_footer_checksum,
+    digest,
     whole_file,
 )
 
