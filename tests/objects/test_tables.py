@@ -9,11 +9,14 @@ import json
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
+from sentences import refused
 
+from semsig_gis.core import EmptyResultError, SourceError
 from semsig_gis.objects import draft_catalog, load
 from semsig_gis.sources import transform_points
 
@@ -173,3 +176,82 @@ def test_every_table_is_drafted_and_loaded_to_the_centimetre(tmp_path: Path) -> 
         assert farthest(objects, places) < 0.01
 
     holds()
+
+
+PLACES = [(round(4.8357 + row * 1.3e-4, 7), round(45.764 + row * 0.9e-4, 7)) for row in range(9)]
+IN_SWITZERLAND = [(x + 3.7, y + 1.6) for x, y in PLACES]
+SWISS = transform_points(np.array(IN_SWITZERLAND), CRS(4326), CRS(2056))
+# Tables with a question, by the names of the fields: the rows, and the words of the question.
+QUESTIONS: dict[str, tuple[Callable[[float, float], str], list[str]]] = {
+    "lat;lon": (lambda x, y: f"{x};{y}", ["exchanged", "Somalia", "Lyon"]),
+    "Y;X": (lambda x, y: f"{x};{y}", ["exchanged", "Somalia", "Lyon"]),
+    "latlon": (lambda x, y: f'"{x}, {y}"', ["exchanged", "Somalia", "Lyon"]),
+    "coordinates": (lambda x, y: f'"{x}, {y}"', ["exchanged", "Somalia", "Lyon"]),
+    "place": (lambda x, y: f"{y} {x}", ["exchanged", "Somalia", "Lyon"]),
+    "a;b": (lambda x, y: f"{x};{y}", ["by their values"]),
+    "cam_lat;cam_lon;light_lat;light_lon": (
+        lambda x, y: f"45.7641;4.8352;{y};{x}",
+        ["cam_lon and cam_lat", "other places"],
+    ),
+    "photo_x;photo_y;wkt": (
+        lambda x, y: f"4.8352;45.7641;POINT({x} {y})",
+        ["photo_x and photo_y", "other places"],
+    ),
+}
+
+
+@pytest.mark.parametrize("names", QUESTIONS)
+def test_draft_asks_where_another_reading_is_possible(names: str, tmp_path: Path) -> None:
+    row, words = QUESTIONS[names]
+    file = tmp_path / "street_lights.csv"
+    file.write_text("\n".join([f"id;{names}", *(f"{n};{row(*p)}" for n, p in enumerate(PLACES))]))
+    text = draft_catalog(file)
+    (question,) = (line for line in text.splitlines() if "_field" in line and "EDIT" in line)
+    assert all(word in question for word in words)
+    assert "# Its positions are near Lyon, France." in text
+    assert farthest(read(file, text), PLACES) < 0.01
+
+
+@pytest.mark.parametrize("names", ["E;N", "Y_Koord;X_Koord", "Ostwert;Nordwert", "x;y", "a;b"])
+def test_swiss_grid_is_known_by_its_numbers(names: str, tmp_path: Path) -> None:
+    file = tmp_path / "street_lights.csv"
+    rows = (f"{n};{x:.3f};{y:.3f}" for n, (x, y) in enumerate(SWISS))
+    file.write_text("\n".join([f"id;{names}", *rows]))
+    text = draft_catalog(file)
+    assert 'crs = "EPSG:2056"  # EDIT' in text
+    assert farthest(read(file, text), IN_SWITZERLAND) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("1;4.8357;45.764\n2;4.8358;45.765\n", ["no header", "'4.8357'", "'lon;lat;column3'"]),
+        ("1;POINT(4.8 45.7)\n2;POINT(4.9 45.7)\n", ["no header"]),
+        ("id;lat;lon\n1;here;4.8\n2;there;4.8\n", ["row 1: lat 'here' is not a number"]),
+        ("name;size\na;1\n", ["name, size", "x_field = ", "y_field = ", 'geometry_field = "size"']),
+    ],
+)
+def test_refusal_names_the_value_or_the_keys(
+    content: str, words: list[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "street_lights.csv"
+    file.write_text(content)
+    with refused(SourceError, *words):
+        draft_catalog(file)
+
+
+def test_built_in_catalogue_finds_well_known_text_under_any_name(tmp_path: Path) -> None:
+    file = tmp_path / "BAUMKATOGD.csv"
+    rows = (f"{n},POINT ({x} {y})" for n, (x, y) in enumerate(PLACES))
+    file.write_text("\n".join(["OBJECTID,SHAPE", *rows]))
+    objects = load(file, catalog="vienna", metric_crs="EPSG:2154", merge=False).objects
+    assert farthest(objects, PLACES) < 0.01
+
+
+def test_first_value_that_cannot_be_read_is_reported(tmp_path: Path) -> None:
+    file = tmp_path / "street_lights.csv"
+    file.write_text("id;lat;lon\n1;45.764;4.8357\n2;45.765;4.8358\n")
+    text = draft_catalog(file)
+    file.write_text("id;lat;lon\n1;n/a;4.8357\n2;45.7.65;4.8358\n")
+    with refused(EmptyResultError, "row 1: lat 'n/a' is not a number", "geometry_field"):
+        read(file, text)
