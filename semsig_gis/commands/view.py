@@ -324,6 +324,12 @@ def _notes(unknown: list[str], tally: Tally) -> Iterator[str]:
     if tally.turned:
         pictures = _many(len(tally.turned), "picture")
         yield f"the boxes of {pictures} are turned as its camera was, because they are not upright"
+    if tally.stretched:
+        pictures = _many(len(tally.stretched), "picture")
+        yield f"the boxes of {pictures} of Roboflow are stretched to the original picture"
+    for name, file in list(tally.several.items())[:1]:
+        more = f", and {len(tally.several) - 1:,} more" if len(tally.several) > 1 else ""
+        yield f"several files may be the picture {name}; {file} is used{more}"
     if tally.faulty_boxes:
         boxes = _many(len(tally.faulty_boxes), "box", "boxes")
         yield f"left out: {boxes}: {tally.faulty_boxes[0]}"

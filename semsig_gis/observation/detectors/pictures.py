@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, unquote, urlsplit
 
 from semsig_gis.observation.detectors.camera import MOST_PIXELS
 from semsig_gis.observation.detectors.documents import INVALID
@@ -26,8 +27,10 @@ FOLDERS = {"labels": "images", "label_2": "image_2", "ann": "img", "Annotations"
 # Boxes are of another picture if the ratio of its sides differs by more.
 SAME_SHAPE = 0.05
 
-# Roboflow names its copy of street.jpg "street_jpg.rf.0a1b2c.jpg".
-ROBOFLOW = re.compile(r"(?i)(.+)_(jpe?g|png|webp|tiff?)\.rf\.\w+(\.\w+)?")
+# Roboflow names its copy of street.jpg "street_jpg.rf.0a1b2c.jpg", or without "_jpg".
+ROBOFLOW = re.compile(r"(?i)(.+?)(?:_(jpe?g|png|webp|tiff?|heic))?\.rf\.\w+(\.\w+)?")
+# Label Studio names its copy of street.jpg "0a1b2c3d-street.jpg".
+UPLOAD = re.compile(r"[0-9a-f]{8}(?:-|__)(.+)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,11 +109,18 @@ class AnnotatedPicture:
     @property
     def names(self) -> tuple[str, ...]:
         """The names of its file, best first: as given, without folders, without the suffix."""
-        path = PurePosixPath(self.name.replace("\\", "/"))
-        names = [self.name, str(path), path.name, path.stem]
+        address = urlsplit(self.name) if "://" in self.name or "?" in self.name else None
+        given = self.name
+        if address:
+            given = parse_qs(address.query).get("d", [address.path])[0]
+        path = PurePosixPath(unquote(given).replace("\\", "/"))
+        names = [self.name, str(path), path.name]
         if original := ROBOFLOW.fullmatch(path.name):
-            names += [f"{original[1]}.{original[2]}", original[1]]
-        return tuple(dict.fromkeys(names))
+            names += [f"{original[1]}.{original[2]}"] if original[2] else []
+            names += [original[1]]
+        if original := UPLOAD.fullmatch(path.name):
+            names += [original[1], PurePosixPath(original[1]).stem]
+        return tuple(dict.fromkeys([*names[:3], path.stem, *names[3:]]))
 
     @property
     def folders(self) -> tuple[Path, ...]:
@@ -139,8 +149,8 @@ def box_of(
     if any(map(math.isnan, (*numbers, value))):
         return faulty_box(f"{where} has a box or a score that is not a number")
     in_range = all(abs(number) <= MOST_PIXELS for number in numbers)
-    if not in_range or right < left or bottom < top:
-        return faulty_box(f"{where} has the box {numbers}, not four numbers with no side below 0")
+    if not in_range or right <= left or bottom <= top:
+        return faulty_box(f"{where} has the box {numbers}, not four numbers with sides above 0")
     if not 0 <= value <= 1:
         return faulty_box(f"{where} has the score {value:g}, not a number from 0 to 1")
     return Box(label=str(label), corners=numbers, score=value, whole=whole)

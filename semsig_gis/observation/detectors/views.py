@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
@@ -17,12 +18,13 @@ from semsig_gis.core import (
     InputError,
     Taxonomy,
     UnknownNameError,
+    nearest_name,
     require_number,
     wrap_degrees,
 )
 from semsig_gis.observation.detectors.camera import USUAL_FOV, Camera, Projection
 from semsig_gis.observation.detectors.exif import PANORAMAS, read_exif
-from semsig_gis.observation.detectors.pictures import Shot, same_shape, upright
+from semsig_gis.observation.detectors.pictures import ROBOFLOW, Shot, same_shape, upright
 from semsig_gis.observation.view import (
     CLASSES,
     LEAST_RANGE_ERROR,
@@ -75,6 +77,10 @@ class Tally:
     """Why boxes cannot be used."""
     turned: set[str] = field(default_factory=set)
     """Pictures with boxes that were turned with the picture."""
+    stretched: set[str] = field(default_factory=set)
+    """Pictures with boxes that were stretched to the picture."""
+    several: dict[str, Path] = field(default_factory=dict)
+    """The files that were used of pictures with several."""
     no_objects: Counter[str] = field(default_factory=Counter)
     unknown: Counter[str] = field(default_factory=Counter)
     not_in_city: Counter[str] = field(default_factory=Counter)
@@ -160,7 +166,9 @@ class ViewBuilder:
     shot: Shot = field(default_factory=Shot)
     shots: Mapping[str, Shot] = field(default_factory=dict)
     folders: Sequence[Path] | None = ()
-    _listings: dict[Path, dict[str, Path]] = field(default_factory=dict, init=False, repr=False)
+    _listings: dict[tuple[Path, bool], dict[str, list[Path]]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def views(
         self, pictures: Iterable[AnnotatedPicture], *, places: Places = "each"
@@ -215,11 +223,16 @@ class ViewBuilder:
                 names[key] = picture.name if shot.place is None else shot.place
                 tally.times |= {} if shot.time is None else {names[key]: shot.time}
             groups.setdefault(key, []).append(view)
-        if tally.no_boxes and not any(picture.boxes for picture in pictures):
-            raise InputError(
-                f"none of the {tally.no_boxes:,} shapes is a box or an outline of one object, only "
-                "points, lines or groups; mark each object with a box or an outline."
-            )
+        left_out = tally.below_min_score, *tally.unknown, *tally.no_objects, *tally.not_in_city
+        if not tally.objects and not any(left_out):
+            if tally.faulty_boxes:
+                raise InputError(f"{tally.faulty_boxes[0]}; correct the file, or export it again.")
+            if tally.no_boxes:
+                raise InputError(
+                    f"the file has {tally.no_boxes:,} shapes, none of them a box or an outline of "
+                    "one object, only points, lines or groups; mark each object with a box or an "
+                    "outline."
+                )
         views = [
             (names[key], parts[0] if len(parts) == 1 else View.joined(parts).turned(0.0))
             for key, parts in groups.items()
@@ -235,7 +248,10 @@ class ViewBuilder:
         if own.heading_error is None:
             own = replace(own, heading_error=self.shot.heading_error)
         shot = own.filled(replace(self.shot, size=None)).filled(picture.shot)
-        if file := self._file(picture):
+        if files := self._files(picture):
+            file = files[0]
+            if len(files) > 1:
+                tally.several[picture.name] = files[0]
             try:
                 exif = read_exif(file)
             except InputError as error:
@@ -245,6 +261,9 @@ class ViewBuilder:
                 tally.unread[picture.name] = str(error)
                 exif = Shot()
             if shot.size and exif.size and not same_shape(shot.size, exif.size):
+                if any(map(ROBOFLOW.fullmatch, picture.names)):
+                    tally.stretched.add(picture.name)
+                    return replace(shot, size=exif.size).filled(replace(exif, turn=None))
                 if exif.turn and same_shape(shot.size, exif.size[::-1]):
                     # The boxes are those of a program that does not turn the picture.
                     tally.turned.add(picture.name)
@@ -258,27 +277,54 @@ class ViewBuilder:
             shot = shot.filled(replace(exif, turn=None))
         return shot.filled(Shot(size=self.shot.size))
 
-    def _file(self, picture: AnnotatedPicture) -> Path | None:
-        """Return the file of a picture, if need be with another case or kind of picture."""
+    def _files(self, picture: AnnotatedPicture) -> list[Path]:
+        """Return the files that may be of a picture, best first, without regard to case and kind.
+
+        InputError if folders in that of the pictures have several.
+        """
         for folder in picture.folders if self.folders is None else self.folders:
             for path in (folder / name for name in picture.names):
                 if path.is_file():
-                    return path
-                if path.parent not in self._listings:
-                    files = path.parent.iterdir() if path.parent.is_dir() else ()
-                    self._listings[path.parent] = {file.name.lower(): file for file in files}
-                listing = self._listings[path.parent]
-                for ending in ("", *PICTURE_SUFFIXES):
-                    if (file := listing.get(path.name.lower() + ending)) and file.is_file():
-                        return file
-        return None
+                    return [path]
+                if found := self._listing(path.parent).get(_key(path.name)):
+                    return found
+            for name in picture.names if self.folders else ():
+                found = self._listing(folder, deep=True).get(_key(name), [])
+                if len(found) > 1:
+                    raise InputError(
+                        f"{picture.name} may be {found[0]} or {found[1]}; give the folder of the "
+                        "right one as --images."
+                    )
+                if found:
+                    return found
+        return []
+
+    def _listing(self, folder: Path, *, deep: bool = False) -> dict[str, list[Path]]:
+        """Return the pictures of a folder by name, with and without suffix, without case.
+
+        With `deep`, those of folders in it as well.
+        """
+        if (folder, deep) not in self._listings:
+            listing: dict[str, list[Path]] = {}
+            files = folder.rglob("*") if deep else folder.iterdir() if folder.is_dir() else ()
+            pictures = [file for file in files if file.suffix.lower() in PICTURE_SUFFIXES]
+            pictures.sort(key=lambda file: (PICTURE_SUFFIXES.index(file.suffix.lower()), file))
+            for file in pictures:
+                listing.setdefault(_key(file.name), []).append(file)
+            for file in pictures:
+                listing.setdefault(_key(file.stem), []).append(file)
+            self._listings[folder, deep] = listing
+        return self._listings[folder, deep]
 
     def _searched(self, picture: AnnotatedPicture) -> str:
         """Return a note for messages on the folder where the file of a picture is missing."""
         folders = picture.folders if self.folders is None else self.folders
-        if not folders or self._file(picture):
+        if not folders or self._files(picture):
             return ""
-        return f" ({picture.name} is not in {folders[0]})"
+        listing = self._listing(folders[0], deep=bool(self.folders))
+        names = {file.name for files in listing.values() for file in files}
+        nearest = nearest_name(PurePosixPath(picture.names[1]).name, sorted(names))
+        return f" ({picture.name} is not in {folders[0]}{nearest})"
 
     def _camera(self, picture: AnnotatedPicture, shot: Shot) -> Camera:
         if shot.size is None:
@@ -311,13 +357,24 @@ class ViewBuilder:
         shot = self._shot(picture, tally)
         camera = self._camera(picture, shot)
         boxes = [(box, meaning) for box in picture.boxes if (meaning := self._meaning(box, tally))]
-        scale = np.array([camera.width, camera.height] * 2, dtype=float)
-        sides = [box.corners for box, _ in boxes]
+        # Boxes may be of the picture before it was turned or stretched.
+        stated = (1, 1) if picture.shares else picture.shot.size or (camera.width, camera.height)
         if shot.turn:
-            size = (1, 1) if picture.shares else (camera.height, camera.width)
-            sides = [upright(corners, shot.turn, size) for corners in sides]
-        corners = np.array(sides, dtype=float).reshape(-1, 4)
-        corners = np.clip(corners * (scale if picture.shares else 1.0), 0.0, scale)
+            boxes = [
+                (replace(box, corners=upright(box.corners, shot.turn, stated)), meaning)
+                for box, meaning in boxes
+            ]
+            stated = stated[::-1]
+        scale = np.array([camera.width, camera.height] * 2, dtype=float)
+        corners = np.array([box.corners for box, _ in boxes], dtype=float).reshape(-1, 4)
+        corners *= scale / np.array(stated * 2)
+        inside = ((corners[:, :2] < scale[:2]) & (corners[:, 2:] > 0)).all(axis=1)
+        for number in np.flatnonzero(~inside):
+            tally.faulty_boxes.append(
+                f"the box {boxes[number][0].corners} of {picture.name} is out of the picture"
+            )
+        boxes = [item for item, is_inside in zip(boxes, inside, strict=True) if is_inside]
+        corners = np.clip(corners[inside], 0.0, scale)
         # The probability of each class, the rest is any class; the height and its deviation.
         scores = np.zeros((len(boxes), CLASSES))
         heights = np.full((len(boxes), 2), math.nan)
@@ -505,6 +562,11 @@ def north_sigma(error: str | float) -> float:
         raise InputError(
             f"the error of a heading is {error!r}; give degrees or 'unknown'."
         ) from fault
+
+
+def _key(name: str) -> str:
+    """Return a name of a file for comparison, without case and forms of accents."""
+    return unicodedata.normalize("NFC", name).casefold()
 
 
 def _metres(first: tuple[float, float], second: tuple[float, float]) -> float:
