@@ -321,15 +321,6 @@ def _notes(unknown: list[str], tally: Tally) -> Iterator[str]:
         yield f"not opened, as all is known without: {pictures}: {reason}"
     if tally.below_min_score:
         yield f"left out: {_many(tally.below_min_score, 'box', 'boxes')} below --min-score"
-    if tally.turned:
-        pictures = _many(len(tally.turned), "picture")
-        yield f"the boxes of {pictures} are turned as its camera was, because they are not upright"
-    if tally.stretched:
-        pictures = _many(len(tally.stretched), "picture")
-        yield f"the boxes of {pictures} of Roboflow are stretched to the original picture"
-    for name, file in list(tally.several.items())[:1]:
-        more = f", and {len(tally.several) - 1:,} more" if len(tally.several) > 1 else ""
-        yield f"several files may be the picture {name}; {file} is used{more}"
     if tally.faulty_boxes:
         boxes = _many(len(tally.faulty_boxes), "box", "boxes")
         yield f"left out: {boxes}: {tally.faulty_boxes[0]}"
@@ -347,7 +338,21 @@ def _notes(unknown: list[str], tally: Tally) -> Iterator[str]:
             names = ", ".join(f"{label} {count:,}" for label, count in frequent)
             more = f" and {len(labels) - MOST_NAMES:,} more" if len(labels) > MOST_NAMES else ""
             yield f"left out: {boxes} {what}: {names}{more}"
+    yield from _picture_notes(tally)
     yield from _heading_notes(tally)
+
+
+def _picture_notes(tally: Tally) -> Iterator[str]:
+    """Yield which pictures are not those of the detector, or may be another file."""
+    if tally.turned:
+        pictures = _many(len(tally.turned), "picture")
+        yield f"the boxes of {pictures} are turned as its camera was, because they are not upright"
+    if tally.stretched:
+        pictures = _many(len(tally.stretched), "picture")
+        yield f"the boxes of {pictures} of Roboflow are stretched to the original picture"
+    for name, file in list(tally.several.items())[:1]:
+        more = f", and {len(tally.several) - 1:,} more" if len(tally.several) > 1 else ""
+        yield f"several files may be the picture {name}; {file} is used{more}"
 
 
 def _heading_notes(tally: Tally) -> Iterator[str]:

@@ -223,16 +223,7 @@ class ViewBuilder:
                 names[key] = picture.name if shot.place is None else shot.place
                 tally.times |= {} if shot.time is None else {names[key]: shot.time}
             groups.setdefault(key, []).append(view)
-        left_out = tally.below_min_score, *tally.unknown, *tally.no_objects, *tally.not_in_city
-        if not tally.objects and not any(left_out):
-            if tally.faulty_boxes:
-                raise InputError(f"{tally.faulty_boxes[0]}; correct the file, or export it again.")
-            if tally.no_boxes:
-                raise InputError(
-                    f"the file has {tally.no_boxes:,} shapes, none of them a box or an outline of "
-                    "one object, only points, lines or groups; mark each object with a box or an "
-                    "outline."
-                )
+        _require_objects(tally)
         views = [
             (names[key], parts[0] if len(parts) == 1 else View.joined(parts).turned(0.0))
             for key, parts in groups.items()
@@ -323,7 +314,7 @@ class ViewBuilder:
             return ""
         listing = self._listing(folders[0], deep=bool(self.folders))
         names = {file.name for files in listing.values() for file in files}
-        nearest = nearest_name(PurePosixPath(picture.names[1]).name, sorted(names))
+        nearest = nearest_name(PurePosixPath(picture.name.replace("\\", "/")).name, sorted(names))
         return f" ({picture.name} is not in {folders[0]}{nearest})"
 
     def _camera(self, picture: AnnotatedPicture, shot: Shot) -> Camera:
@@ -368,7 +359,9 @@ class ViewBuilder:
         scale = np.array([camera.width, camera.height] * 2, dtype=float)
         corners = np.array([box.corners for box, _ in boxes], dtype=float).reshape(-1, 4)
         corners *= scale / np.array(stated * 2)
-        inside = ((corners[:, :2] < scale[:2]) & (corners[:, 2:] > 0)).all(axis=1)
+        inside: NDArray[np.bool_] = np.logical_and(
+            (corners[:, :2] < scale[:2]).all(axis=1), (corners[:, 2:] > 0).all(axis=1)
+        )
         for number in np.flatnonzero(~inside):
             tally.faulty_boxes.append(
                 f"the box {boxes[number][0].corners} of {picture.name} is out of the picture"
@@ -562,6 +555,20 @@ def north_sigma(error: str | float) -> float:
         raise InputError(
             f"the error of a heading is {error!r}; give degrees or 'unknown'."
         ) from fault
+
+
+def _require_objects(tally: Tally) -> None:
+    """Raise InputError if all there is are boxes with faults, or shapes that are no boxes."""
+    left_out = tally.below_min_score, *tally.unknown, *tally.no_objects, *tally.not_in_city
+    if tally.objects or any(left_out):
+        return
+    if tally.faulty_boxes:
+        raise InputError(f"{tally.faulty_boxes[0]}; correct the file, or export it again.")
+    if tally.no_boxes:
+        raise InputError(
+            f"none of the {tally.no_boxes:,} shapes is a box or an outline of one object, only "
+            "points, lines or groups; mark each object with a box or an outline."
+        )
 
 
 def _key(name: str) -> str:

@@ -549,7 +549,7 @@ LABEL = st.sampled_from(["bench", "stop_sign", "Laternen-Mast", "ベンチ"])
 SIDE = st.integers(0, 9999)
 BOXES = st.lists(
     st.tuples(LABEL, SIDE, SIDE, SIDE, SIDE).map(
-        lambda box: (box[0], min(box[1::2]), min(box[2::2]), max(box[1::2]), max(box[2::2]))
+        lambda box: (box[0], min(box[1::2]), min(box[2::2]), max(box[1::2]) + 1, max(box[2::2]) + 1)
     ),
     min_size=1,
     max_size=4,
