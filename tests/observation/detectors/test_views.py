@@ -251,7 +251,7 @@ def test_pictures_that_cannot_be_used_are_left_out(tmp_path: Path) -> None:
     views, tally = replace(BUILDER, folders=[tmp_path]).views(bare)
     assert [name for name, _ in views] == ["a.jpg"]
     assert (tally.photos, tally.objects, list(tally.unusable)) == (1, 1, ["b.jpg", "c.jpg"])
-    assert f"(b.jpg is not in {tmp_path})" in tally.unusable["b.jpg"]
+    assert f"(b.jpg is not in {tmp_path}; the nearest is 'c.jpg')" in tally.unusable["b.jpg"]
     assert "it is not a picture" in tally.unusable["c.jpg"]
     with refused(InputError, "the size of the picture b.jpg is not known"):
         replace(BUILDER, folders=[tmp_path]).views(bare[1:2])
