@@ -19,6 +19,8 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core import (
+    MAX_CODE,
+    OWN_CODES,
     CatalogError,
     CrsError,
     EmptyResultError,
@@ -29,8 +31,14 @@ from semsig_gis.core import (
     temporary_folder,
     town_of,
 )
-from semsig_gis.objects.draft_folder import known_sources, need_of, sort_files
-from semsig_gis.objects.draft_layers import LayerDraft, own_classes, shared_layers, snake
+from semsig_gis.objects.draft_folder import command, known_sources, need_of, sort_files
+from semsig_gis.objects.draft_layers import (
+    LayerDraft,
+    own_classes,
+    shared_layers,
+    snake,
+    without_code,
+)
 from semsig_gis.objects.guesses import (
     VECTOR,
     ClassGuess,
@@ -56,10 +64,11 @@ from semsig_gis.sources import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from semsig_gis.core import AnyCrs
     from semsig_gis.objects.guesses import Column, LayerSample
+    from semsig_gis.objects.layers import LayerReport
     from semsig_gis.sources import PositionFields, RawLayer
 
 
@@ -125,7 +134,7 @@ def draft_catalog(path: str | Path, *, crs: AnyCrs | None = None) -> str:
     path = Path(path)
     stated = None if crs is None else crs_text(crs)
     if is_folder(path):
-        return _folder(path, stated)
+        return _Folder(path, stated).draft()
     need = need_of(path) if path.exists() else ""
     drafts, remarks = _drafts(path, stated)
     if need.startswith("no catalogue"):
@@ -133,48 +142,69 @@ def draft_catalog(path: str | Path, *, crs: AnyCrs | None = None) -> str:
     return _loading(path, drafts, remarks)
 
 
-def _folder(folder: Path, crs: str | None) -> str:
-    """Draft a catalogue for all files of a folder that need one."""
-    files, lines = sort_files(folder)
-    remarks: list[str] = []
-    layers_of: dict[Path, list[LayerDraft]] = {}
+class _Folder:
+    """The files of a folder: layers of those that are drafted, and lines on the others."""
 
-    def usable(file: Path, make: Callable[[], object]) -> bool:
-        try:
-            make()
-        except SemsigError as error:
-            lines.append(f"{file.name}: left out: {str(error).rstrip('.')}")
-            return False
-        return True
-
-    def draft(file: Path) -> None:
-        layers_of[file], about = _drafts(file, crs)
-        remarks.extend(about)
-
-    def together() -> str:
-        if not layers_of:
-            raise SourceError(
-                f"{folder} has no file that a catalogue can be drafted for; "
-                f"{'; '.join(lines) or 'it is empty'}."
+    def __init__(self, folder: Path, crs: str | None) -> None:
+        """Read the files that need a catalogue."""
+        self.folder = folder
+        files, self.lines = sort_files(folder)
+        self.remarks: list[str] = []
+        self.layers_of: dict[Path, list[LayerDraft]] = {}
+        for file in files:
+            try:
+                self.layers_of[file], remarks = _drafts(file, crs)
+            except SemsigError as error:
+                self.leave_out(file, error)
+            else:
+                self.remarks += remarks
+        for file in without_code(self.layers_of):
+            self.leave_out(
+                file,
+                f"no code for another class is free; draft it by itself: {command('draft', file)}",
             )
-        drafts = [item for layers in layers_of.values() for item in layers]
-        return _loading(folder, shared_layers(drafts, folder), [*remarks, *lines])
 
-    for file in files:
-        usable(file, lambda file=file: draft(file))  # type: ignore[misc] # bound at once
-    try:
-        return together()
-    except SourceError:
-        # Files that do not load are left out; if each one loads, they do not go together.
-        loadable = {
-            file: layers
-            for file, layers in layers_of.items()
-            if usable(file, lambda file=file, layers=layers: _loading(file, layers, []))  # type: ignore[misc] # bound at once
-        }
-        if len(loadable) == len(layers_of):
-            raise
-        layers_of = loadable
-        return together()
+    def leave_out(self, file: Path, reason: object) -> None:
+        """Leave a file out of the draft, with a line on the reason."""
+        self.layers_of.pop(file, None)
+        self.lines.append(f"{file.name}: left out: {str(reason).rstrip('.')}")
+
+    def draft(self) -> str:
+        """Draft a catalogue for all files, without those that do not load with it."""
+        while True:
+            try:
+                return self._together()
+            except SourceError as error:
+                if not self.layers_of or not (self._unusable() or self._misplaced(error)):
+                    raise
+
+    def _together(self) -> str:
+        if not self.layers_of:
+            why = "; ".join(self.lines) or "it is empty"
+            raise SourceError(
+                f"{self.folder} has no file that a catalogue can be drafted for; {why}."
+            )
+        drafts = [layer for layers in self.layers_of.values() for layer in layers]
+        shared = shared_layers(drafts, self.folder)
+        return _loading(self.folder, shared, [*self.remarks, *self.lines])
+
+    def _unusable(self) -> bool:
+        """Leave out the files that do not load by themselves; return whether there are some."""
+        size = len(self.layers_of)
+        for file, layers in list(self.layers_of.items()):
+            try:
+                _loading(file, layers, [])
+            except SourceError as error:
+                self.leave_out(file, error)
+        return len(self.layers_of) < size
+
+    def _misplaced(self, error: SourceError) -> bool:
+        """Leave out the file that an error says is far from the others, if it does."""
+        for file, layers in list(self.layers_of.items()):
+            if any(f"layer {snake(layer.name)!r} lies" in str(error) for layer in layers):
+                self.leave_out(file, error.__cause__ or error)
+                return True
+        return False
 
 
 def _drafts(path: Path, crs: str | None) -> tuple[list[LayerDraft], list[str]]:
@@ -184,7 +214,7 @@ def _drafts(path: Path, crs: str | None) -> tuple[list[LayerDraft], list[str]]:
     if not layers:
         fields = items[0].info.fields
         raise SourceError(f"{path} has no layer with positions and {no_positions(fields)}.")
-    drafts = [_draft(path, item, crs) for item in layers]
+    drafts = [_draft(path, item, crs, several=len(layers) > 1) for item in layers]
     remarks = []
     if len(layers) < len(items):
         tables = ", ".join(_text(item.info.name) for item in items if item not in layers)
@@ -213,7 +243,13 @@ def _loading(path: Path, drafts: Sequence[LayerDraft], remarks: Sequence[str]) -
     ]
     if usual != VECTOR:
         lines.append(f"reader = {_text(usual)}")
-    lines += _classes(drafts)
+    try:
+        lines += _classes(drafts)
+    except CatalogError as error:
+        raise SourceError(
+            f"{path} has more layers of unknown classes than there are codes for own classes, "
+            f"{MAX_CODE - OWN_CODES + 1}; move some of its files to another folder."
+        ) from error
     in_file = Counter(draft.file for draft in drafts)
     names = _unique(snake(draft.name) for draft in drafts)
     for name, draft in zip(names, drafts, strict=True):
@@ -235,15 +271,22 @@ def _towns(layers: Sequence[RawLayer]) -> Iterator[str]:
 def _loaded(lines: Sequence[str], path: Path) -> tuple[RawLayer, ...]:
     """Return the layers that are read with a draft; SourceError if the file does not load."""
     layers: tuple[RawLayer, ...] = ()
+    lost: list[LayerReport] = []
     with temporary_folder(Path(tempfile.gettempdir())) as folder:
         file = folder / "draft.toml"
         file.write_text("\n".join(lines), encoding="utf-8")
         try:
             catalog = load_catalog(file)
             layers, _ = read_files(catalog.layers, [path])
-            empty = any(layer.table.geometry.isna().all() for layer in layers)
+            # A file may have layers without rows, but not only these.
+            placed = {
+                files: any(layer.table.geometry.notna().any() for layer in of_files)
+                for files, of_files in itertools.groupby(layers, lambda layer: layer.spec.files)
+            }
+            empty = not all(placed.values())
             if not empty and any(layer.spec.role == "objects" for layer in layers):
-                assemble(layers, catalog)
+                report = assemble(layers, catalog).report.layers
+                lost = [item for item in report if item.counts.misplaced and not item.counts.kept]
         except EmptyResultError:
             empty = True
         except SemsigError as error:
@@ -253,15 +296,25 @@ def _loaded(lines: Sequence[str], path: Path) -> tuple[RawLayer, ...]:
     if empty:
         bad = next((f" ({layer.errors[0]})" for layer in layers if layer.errors), "")
         raise SourceError(f"{path} has no layer with positions{bad}; give a file that has one.")
+    if lost and is_folder(path):
+        raise SourceError(
+            f"layer {lost[0].name!r} lies far from all others; look at its coordinate system and "
+            "at the order of its coordinates."
+        )
     return layers
 
 
-def _draft(path: Path, sample: LayerSample, crs: str | None) -> LayerDraft:
+def _draft(path: Path, sample: LayerSample, crs: str | None, *, several: bool) -> LayerDraft:
+    """Guess what a layer of a file holds, one of `several`."""
     columns = columns_of(sample)
     geometry = GEOMETRIES.get(sample.info.geometry.removeprefix("3D ").removeprefix("Multi"))
     names = f"{path.stem} / {sample.info.name}"
     rows = len(sample.rows)
-    guess = guess_class(names, columns, geometry=geometry, rows=rows)
+    guess = guess_class(sample.info.name, columns, geometry=geometry, rows=rows)
+    if not several or guess.by_values or not guess.name:
+        guess = guess_class(names, columns, geometry=geometry, rows=rows)
+        # One of several layers of a file may be something else than the file says.
+        guess = replace(guess, sure=guess.sure and not several)
     candidates = [column for column in columns if column.meant_for("filter") or not guess.sure]
     name = "" if guess.by_values else guess.name
     class_by = None if guess.is_role else guess_class_by(candidates, name, sure=guess.sure)

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from semsig_gis.core import MAX_CODE, OWN_CODES
 from semsig_gis.sources import built_in_taxonomy, families, matches_pattern, words_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from semsig_gis.objects.guesses import ClassGuess, Column, LayerSample
     from semsig_gis.sources import PositionFields
@@ -118,6 +119,19 @@ def own_classes(drafts: Sequence[LayerDraft]) -> list[LayerDraft]:
             guess = replace(guess, name=names[plain.casefold()])
         result.append(replace(draft, guess=guess))
     return result
+
+
+def without_code(layers_of: Mapping[Path, Sequence[LayerDraft]]) -> list[Path]:
+    """Return the files with unknown classes for which no code for an own class is left."""
+    used = 0
+    files = []
+    for file, layers in layers_of.items():
+        unknown = sum(not layer.guess.name for layer in layers)
+        if unknown and used + unknown > MAX_CODE - OWN_CODES + 1:
+            files.append(file)
+        else:
+            used += unknown
+    return files
 
 
 def _own_name(text: str, names: set[str]) -> str:

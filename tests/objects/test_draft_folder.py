@@ -117,6 +117,35 @@ def test_classes_agree_and_do_not_clash(tmp_path: Path) -> None:
     assert "is it the same data as stuff.csv?" in text
 
 
+def test_more_unknown_files_than_codes_are_left_out(tmp_path: Path) -> None:
+    names = [f"{first}{second}x" for first in "abcdef" for second in "abcdef"]
+    town = folder(tmp_path / "town", **{f"{name}__csv": table("a") for name in names})
+    text, content = draft(town)
+    assert len(content["classes"]) == 32
+    assert sum("no code for another" in line for line in text.splitlines()) == 4
+
+
+def test_layers_without_rows_are_drafted_with_others(tmp_path: Path) -> None:
+    town = folder(tmp_path / "town")
+    places = gpd.GeoSeries.from_xy([765300], [6280000], crs=2154)
+    frame = gpd.GeoDataFrame({"ref": ["a"]}, geometry=places)
+    for layer, rows in {"bancs": frame, "arbres": frame[:0]}.items():
+        rows.to_file(town / "all.gpkg", layer=layer)
+    _, content = draft(town)
+    assert [layer["layer"] for layer in content["layers"]] == ["bancs", "arbres"]
+
+
+def test_file_far_from_the_others_is_left_out(tmp_path: Path) -> None:
+    exchanged = "id;lat;lon\n" + "\n".join(f"{row};3.88;43.61" for row in range(3))
+    files = {f"{name}__csv": table(range(9)) for name in ("arbres", "bancs", "horodateurs")}
+    town = folder(tmp_path / "town", **files, lampadaires__csv=exchanged)
+    text, content = draft(town)
+    assert len(content["layers"]) == 3
+    (line,) = (line for line in text.splitlines() if "lampadaires.csv" in line)
+    assert "left out" in line
+    assert "far from" in line
+
+
 def test_parts_of_a_layer_are_joined_if_their_ids_differ(tmp_path: Path) -> None:
     town = folder(
         tmp_path / "town",
