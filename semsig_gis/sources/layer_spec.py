@@ -199,7 +199,8 @@ class LayerSpec:
         Field of a table that holds the whole position: well-known text or binary, GeoJSON, latitude
         and longitude, and other notations.
     axis_order : {"lat_lon", "lon_lat"}, optional
-        Order of two numbers in `geometry_field`, if they do not show it.
+        Order of two numbers in `geometry_field`, if they do not show it. With ``lat_lon``, its
+        geometries have latitude first, too.
     aliases : tuple of (str, tuple of str)
         Fields and their names in other editions of the file (Opendatasoft only).
     dataset : str, optional

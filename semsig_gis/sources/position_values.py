@@ -79,7 +79,7 @@ SEPARATORS = tuple(
         ),
     )
 )
-HALF_TURN, RIGHT_ANGLE, SIXTY = 180.0, 90.0, 60.0
+HALF_TURN, SIXTY = 180.0, 60.0
 FLOAT = r"[+-]?\d+(?:\.\d*)?(?:e[+-]?\d+)?"
 TWO_NUMBERS = re.compile(rf"({FLOAT})\s*[,;\s]\s*({FLOAT})")
 LATITUDE, LONGITUDE = "lat", "lon"
@@ -342,7 +342,8 @@ def _of_members(value: Mapping[str, Any], order: AxisOrder | None) -> Located | 
     if LATITUDE in axes and LONGITUDE in axes:
         if all(member is None or member == "" for member in axes.values()):
             return None
-        return Located((coordinate(axes[LONGITUDE]), coordinate(axes[LATITUDE])))
+        xy = coordinate(axes[LONGITUDE]), coordinate(axes[LATITUDE])
+        return Located(xy, pair=True, order="lat_lon")
     for member in value.values():
         if isinstance(member, dict | list | tuple) and member:
             try:

@@ -79,7 +79,8 @@ APART_DEGREES, APART_METRES = 2e-4, 20.0
 class PositionFields:
     """The fields of positions: `x` (easting or longitude) and `y`, or `field` for both.
 
-    `order` is that of a pair in `field` which does not show its own. `english` is whether a comma
+    `order` is that of a pair in `field` which does not show its own; with `turned`, geometries in
+    it have latitude first. `english` is whether a comma
     may separate thousands, `o_is_east` whether the letter O means east (German). `crs` is the one
     that the coordinates suggest. What a person has to check is in `questions`; without `sure`, the
     names of the fields do not say that they are positions.
@@ -89,6 +90,7 @@ class PositionFields:
     y: str | None = None
     field: str | None = None
     order: AxisOrder | None = None
+    turned: bool = False
     english: bool = False
     o_is_east: bool = False
     crs: str | None = None
@@ -105,15 +107,21 @@ class PositionFields:
         """The same fields with x as y."""
         if self.field is None:
             return replace(self, x=self.y, y=self.x)
-        return replace(self, order=LAT_LON if self.order == LON_LAT else LON_LAT)
+        order = LON_LAT if self.order == LAT_LON else LAT_LON
+        return replace(self, order=order, turned=order == LAT_LON)
 
     def locate(self, values: Row) -> Located | None:
         """Return the position of a row, or None if it is blank; BadFeatureError if it has none."""
         if self.field is not None:
             try:
-                return locate(values.get(self.field), self.order, o_is_east=self.o_is_east)
+                found = locate(values.get(self.field), self.order, o_is_east=self.o_is_east)
             except BadFeatureError as error:
                 raise BadFeatureError(f"{self.field} {error}") from error
+            if found is None or found.pair or not self.turned:
+                return found
+            if isinstance(found.position, tuple):
+                return found._replace(position=found.position[::-1])
+            return found._replace(position=shapely.transform(found.position, np.fliplr))
         both = [(name, values.get(name)) for name in self.names]
         if all(_is_blank(value) for _, value in both):
             return None
@@ -173,7 +181,9 @@ def stated_fields(spec: LayerSpec, fields: Sequence[str], *, where: str) -> Posi
         require_field(spec.geometry_field, fields, where=where, key="geometry_field")
         order = spec.axis_order or order_by_name(spec.geometry_field)
         east = o_is_east_in(fields)
-        return PositionFields(field=spec.geometry_field, order=order, o_is_east=east)
+        turned = spec.axis_order == LAT_LON
+        name = spec.geometry_field
+        return PositionFields(field=name, order=order, turned=turned, o_is_east=east)
     if not (spec.x_field or spec.y_field):
         return None
     if not (spec.x_field and spec.y_field):
@@ -278,11 +288,14 @@ def _whole_fields(
         if 2 * len(hits) < len(filled):
             continue
         free = [item for item in hits if item.pair and item.order is None]
-        fixed = 2 * len(free) < len(hits)
+        fixed = 2 * sum(item.order is not None for item in hits) > len(hits)
+        geometries = 2 * sum(not item.pair for item in hits) >= len(hits)
         places = tuple(item and _xy(item) for item in found)
         degrees = _in_degrees(places)
-        unclear = not fixed and (order is None or name.casefold() == "coordinates")
-        if not fixed and order is None:
+        order = None if fixed or geometries else order
+        bare = not (fixed or geometries)
+        unclear = bare and (order is None or name.casefold() == "coordinates")
+        if bare and order is None:
             plane = not degrees and not _in_degrees(tuple(p and p[::-1] for p in places))
             order = LON_LAT if plane or any(item.bracketed for item in free) else LAT_LON
         tokens = {*tokens_of(name)}
@@ -295,7 +308,7 @@ def _whole_fields(
             _distinct(places),
             -number,
         )
-        own = PositionFields(field=name, order=None if fixed else order, o_is_east=o_is_east)
+        own = PositionFields(field=name, order=order, o_is_east=o_is_east)
         about_words = tuple(sorted(tokens - hints("frames") - hints("whole")))
         fine = sum(len(MANY_DECIMALS.findall(str(value))) > 1 for value in filled)
         precise = 2 * fine >= len(filled)
@@ -516,10 +529,11 @@ def _oriented(best: _Candidate) -> PositionFields:
         return _with_grid(found.exchanged, turned)
     fits = (_in_degrees(places), _in_degrees(turned))
     if fits == (False, True) and not best.fixed:
-        if found.field is not None:
+        if best.unclear:
             return found.exchanged
         if best.precise:
-            text = f"{found.y} is out of the range of latitudes, so that {found.x} is taken for it"
+            first, second = (found.field, "the other") if found.field else (found.y, found.x)
+            text = f"{first} is out of the range of latitudes, so that {second} is taken for it"
             return replace(found.exchanged, questions=(text,))
     if not (all(fits) and best.precise):
         return _with_grid(found, places)
@@ -539,8 +553,8 @@ def _by_towns(best: _Candidate, turned: Sequence[XY | None]) -> PositionFields:
     maybe = here > FAR_FROM_TOWN_KM and there <= IN_TOWN_KM
     if not best.fixed and (surely or (maybe and best.unclear)):
         question = (
-            f"longitude and latitude look exchanged: as the name says, {as_said}; as read here, "
-            f"{exchanged}"
+            f"longitude and latitude look exchanged: as they are written, {as_said}; as read "
+            f"here, {exchanged}"
         )
         return replace(found.exchanged, questions=(question,))
     if surely or maybe or best.unclear:

@@ -187,6 +187,7 @@ QUESTIONS: dict[str, tuple[Callable[[float, float], str], list[str]]] = {
     "Y;X": (lambda x, y: f"{x};{y}", ["exchanged", "Somalia", "Lyon"]),
     "latlon": (lambda x, y: f'"{x}, {y}"', ["exchanged", "Somalia", "Lyon"]),
     "coordinates": (lambda x, y: f'"{x}, {y}"', ["exchanged", "Somalia", "Lyon"]),
+    "geom": (lambda x, y: f"POINT({y} {x})", ["exchanged", "Somalia", "Lyon"]),
     "place": (lambda x, y: f"{y} {x}", ["exchanged", "Somalia", "Lyon"]),
     "a;b": (lambda x, y: f"{x};{y}", ["by their values"]),
     "cam_lat;cam_lon;light_lat;light_lon": (
