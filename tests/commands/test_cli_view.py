@@ -13,6 +13,7 @@ from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
 from sentences import sentence
 from small_detectors import LAYOUTS, save_detector, save_photograph
+from workbench import picture
 
 from benchmarks.rendered import Scene
 from semsig_gis.observation import Camera, Photo, View, read_queries
@@ -116,6 +117,18 @@ def test_focal_length_is_read_from_exif(coco: Path, run: Run) -> None:
     Image.new("L", (400, 300)).save(coco.parent / "images/a.jpg", exif=exif)
     assert run("view coco.json --out v.jsonl")[0] == 0
     assert written(coco.with_name("v.jsonl"))[1].photos[0].width == pytest.approx(67.3, abs=0.1)
+
+
+def test_direction_of_travel_and_picture_that_is_not_read_are_noted(coco: Path, run: Run) -> None:
+    file = coco.with_name("a.jpg")
+    content = picture(exif={Base.FocalLengthIn35mmFilm: 26}, gps={GPS.GPSTrack: 200.0})
+    file.write_bytes(content)
+    code, _, err = run("view coco.json --out v.jsonl")
+    assert (code, "the direction of travel" in err, "true north" in err) == (0, True, True)
+    file.write_bytes(b"\0\0\0\x18ftypheic\0\0\0\0mif1heic")
+    code, _, err = run("view coco.json --out v.jsonl --fov 90 --heading 200")
+    assert (code, "not opened" in err, "HEIC" in err, "travel" in err) == (0, True, True, False)
+    sentence(run("view coco.json --out v.jsonl --fov 90"), "HEIC", "--heading")
 
 
 def test_pictures_and_files_that_are_left_out_are_named(coco: Path, run: Run) -> None:

@@ -131,6 +131,32 @@ def test_panorama_is_recognized_by_its_ratio(page: Page) -> None:
     assert len(info["notes"]) == 1
 
 
+def test_cropped_panorama_is_read_with_its_horizon(page: Page) -> None:
+    xmp = {
+        "ProjectionType": "equirectangular",
+        "PoseHeadingDegrees": 90,
+        "FullPanoWidthPixels": 1600,
+        "FullPanoHeightPixels": 800,
+        "CroppedAreaImageWidthPixels": 400,
+        "CroppedAreaImageHeightPixels": 300,
+        "CroppedAreaLeftPixels": 400,
+        "CroppedAreaTopPixels": 280,
+    }
+    info = json.loads(page.send("/api/photo?name=p.jpg", picture(xmp=xmp))[2])
+    assert (info["projection"], info["fov"], info["horizon"]) == ("equirectangular", 90.0, 120.0)
+    assert abs(info["heading"] - 45.0) < 3.0  # of grid north
+    assert "panorama of 90°" in info["notes"][0]
+    mark = {"box": [195, 120, 205, 140], "class": "bench"}
+    rows = [
+        page.ask("/api/answer", {"views": [{"photos": [info | {"marks": [mark], **more}]}]})[
+            "views"
+        ][0]
+        for more in ({}, {"horizon": None})
+    ]
+    assert rows[0]["bearings"] == rows[1]["bearings"] == [round(info["heading"], 2)]
+    assert rows[0]["ranges"] != rows[1]["ranges"]
+
+
 @pytest.mark.parametrize(
     ("content", "word"),
     [
