@@ -175,6 +175,14 @@ def test_every_layer_with_geometry_is_drafted(
     check(file, snapshot)
 
 
+def test_layer_without_rows_does_not_prevent_a_draft(tmp_path: Path) -> None:
+    file = tmp_path / "town.gpkg"
+    table = gpd.GeoDataFrame({"a": [1]}, geometry=[shapely.Point(4.8, 45.7)], crs="EPSG:4326")
+    for name, rows in (("closed", 0), ("trees", 1)):
+        table.head(rows).to_file(file, layer=name, geometry_type="Point")
+    assert 'layer = "trees"' in draft_catalog(file)
+
+
 def test_unusual_names_and_values_are_quoted(tmp_path: Path) -> None:
     file = write(
         tmp_path / 'arbres [2] "x" # ü.geojson',

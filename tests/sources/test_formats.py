@@ -14,7 +14,14 @@ import shapely
 from geojson import collection, feature, point
 from vector_files import write
 
-from semsig_gis.sources import LayerSpec, first_rows, list_layers, read_layer
+from semsig_gis.sources import (
+    DRIVERS,
+    LayerSpec,
+    data_folder,
+    first_rows,
+    list_layers,
+    read_layer,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -160,3 +167,18 @@ def test_unstated_encoding_of_a_shapefile_is_found(
     assert by_name.notes == ()
     (info,) = list_layers(path)
     assert (info.encoding and info.encoding.encoding) == (None if encoding == "utf-8" else encoding)
+
+
+def test_links_of_kml_are_not_followed(tmp_path: Path) -> None:
+    mark = "<Placemark><Point><coordinates>2.5,48.5</coordinates></Point></Placemark>"
+    link = "<NetworkLink><Link><href>inner.kml</href></Link></NetworkLink>"
+    folder = "<Folder><name>empty</name></Folder>"
+    for name, content in (("inner.kml", mark * 5), ("a.kml", link + folder + mark)):
+        (tmp_path / name).write_text(f"<kml><Document>{content}</Document></kml>")
+    assert [info.rows for info in list_layers(tmp_path / "a.kml")] == [1]
+
+
+def test_documentation_names_every_suffix() -> None:
+    table = (data_folder() / "README.md").read_text("utf-8").partition("## Formats of files")[2]
+    rows = table.partition("\n## ")[0]
+    assert {suffix for suffix in DRIVERS if f"`{suffix}`" not in rows} == set()

@@ -10,6 +10,7 @@ import json
 import re
 import shutil
 import struct
+import tempfile
 import zipfile
 import zlib
 from dataclasses import replace
@@ -76,7 +77,13 @@ def members(path: Path) -> tuple[Member, ...]:
     if is_geodatabase(path):
         return (Member(path, None),)
     require_file(path, "a vector file")
-    return _members(path, file_stamp(path))
+    try:
+        return _members(path, file_stamp(path))
+    except OSError as error:
+        raise SourceError(
+            f"{path} cannot be unpacked in {tempfile.gettempdir()} ({error.strerror}); make room "
+            "there, or name another folder in TMPDIR."
+        ) from error
 
 
 @functools.lru_cache(maxsize=MOST_FILES)

@@ -29,7 +29,7 @@ from semsig_gis.sources.rows import BadFeatureError, LayerBuilder, choose_crs, f
 from semsig_gis.sources.vector import by_pyogrio
 from semsig_gis.sources.vector.by_pyogrio import describe, first_rows_of, layer_names, read_whole
 from semsig_gis.sources.vector.contents import members
-from semsig_gis.sources.vector.formats import CSV, GEOJSON, SINGLE, WITH_FIONA
+from semsig_gis.sources.vector.formats import CSV, GEOJSON, KML, SINGLE, WITH_FIONA
 from semsig_gis.sources.vector.member import unreadable
 
 if TYPE_CHECKING:
@@ -278,6 +278,9 @@ def first_rows(
 def _layers(path: Path) -> tuple[Member, ...]:
     """Return the layers of a file, or of all the files in an archive."""
     layers = [layer for member in members(path) for layer in _layers_of(member)]
+    # Folders of KML may contain only other folders or links.
+    filled = [layer for layer in layers if layer.driver != KML or describe(layer).rows]
+    layers = filled or layers
     names = Counter(layer.name for layer in layers)
     # Layers of the same name in several files are distinguished by the paths of these.
     return tuple(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
-import shutil
 import tempfile
 import weakref
 import zipfile
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import IO, TYPE_CHECKING
 
-from semsig_gis.core import SourceError
+from semsig_gis.core import SourceError, temporary_folder
 from semsig_gis.sources.encodings import gdal_name
 from semsig_gis.sources.vector.formats import (
     DRIVERS,
@@ -42,9 +42,9 @@ class Copy:
 
     def __init__(self, name: str) -> None:
         """Create the folder, for a file of this name."""
-        folder = Path(tempfile.mkdtemp(prefix="semsig-"))
-        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        self.path = folder / name
+        stack = contextlib.ExitStack()
+        self.path = stack.enter_context(temporary_folder(Path(tempfile.gettempdir()))) / name
+        weakref.finalize(self, stack.close)
 
 
 @dataclass(frozen=True, slots=True)
