@@ -6,7 +6,7 @@ import bz2
 import contextlib
 import gzip
 import zlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO, cast
 
 from semsig_gis.core import SourceError
 
@@ -62,3 +62,11 @@ def check_compression_ratio(path: Path) -> None:
             used = compressed.tell() - READ_AHEAD_BYTES
             if SAMPLE_BYTES < uncompressed <= MAX_RATIO * used:
                 return
+
+
+def open_unpacked(path: Path) -> BinaryIO:
+    """Open a file, also if it is compressed by gzip or bzip2."""
+    suffix = path.suffix.lower()
+    if suffix == ".gz":
+        return cast("BinaryIO", gzip.open(path))
+    return cast("BinaryIO", bz2.open(path)) if suffix == ".bz2" else path.open("rb")

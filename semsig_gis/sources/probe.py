@@ -10,6 +10,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Literal
 
 from semsig_gis.sources import parquet, vector
+from semsig_gis.sources.compression import open_unpacked
 from semsig_gis.sources.paths import file_stamp
 from semsig_gis.sources.vector.formats import ARCHIVES, CSV, DRIVERS, WORKBOOKS
 
@@ -32,7 +33,9 @@ TEXT_SUFFIXES = frozenset(
 START_BYTES = 2**16
 BOM = b"\xef\xbb\xbf"
 ROOT = re.compile(rb"<(osm\w*)[\s>]")
-ELEMENT = re.compile(rb'"(?:elements"\s*:\s*\[|type"\s*:\s*"(?:node|way|relation)")')
+ELEMENT = re.compile(
+    rb'"(?:elements"\s*:\s*\[|type"\s*:\s*"(?:node|way|relation)"|nodes"\s*:\s*\[\s*\{[^}]*"lat")'
+)
 # Keys of other sources, all of which are there.
 KEYS: dict[SourceFormat, tuple[re.Pattern[bytes], ...]] = {
     "gbfs": tuple(map(re.compile, (rb'"data"\s*:', rb'"stations"\s*:\s*\[', rb'"station_id"'))),
@@ -69,7 +72,8 @@ def _probe(path: Path, suffix: str, stamp: tuple[tuple[int, int, int], ...]) -> 
     """Open a file; `stamp` is the part of the cache's key that changes with the file."""
     if suffix in parquet.SUFFIXES and stamp:
         return FileProbe("parquet", columns=(tuple(parquet.column_names(path)),))
-    if suffix in TEXT_SUFFIXES and stamp and (kind := text_format(path)):
+    inner = Path(path.stem).suffix.lower() if suffix in {".bz2", ".gz"} else suffix
+    if inner in TEXT_SUFFIXES and stamp and (kind := text_format(path)):
         return FileProbe(kind)
     if suffix == ".zip" and stamp and _is_feed(path):
         return FileProbe("gtfs")
@@ -84,15 +88,21 @@ def text_format(path: Path) -> Literal["osm", "overpass"] | SourceFormat | None:
 
     Elements of OpenStreetMap are "osm" as XML and "overpass" as JSON.
     """
-    with path.open("rb") as stream:
-        start = stream.read(START_BYTES)
+    packed = path.suffix.lower() in {".bz2", ".gz"}
+    try:
+        with open_unpacked(path) as stream:
+            start = stream.read(START_BYTES)
+    except (EOFError, OSError):
+        if packed:
+            return None  # not of this format, or damaged
+        raise
     start = start.removeprefix(BOM).lstrip()
     if start.startswith(b"<"):
         return "osm" if ROOT.search(start) else None
     if path.name.lower() == "stops.txt" and b"stop_lat" in start:
         return "gtfs"
     for kind, keys in KEYS.items():
-        if all(key.search(start) for key in keys):
+        if not packed and all(key.search(start) for key in keys):
             return kind
     return "overpass" if ELEMENT.search(start) and b'"Feature' not in start else None
 

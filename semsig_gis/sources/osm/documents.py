@@ -5,21 +5,20 @@ Such XML has centres or geometries of Overpass servers, or elements that an edit
 
 from __future__ import annotations
 
-import bz2
 import collections
 import dataclasses
-import gzip
 import itertools
 import operator
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Literal, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 from xml.etree import ElementTree as ET  # without entities, see `_read_xml`
 
 import numpy as np
 
 from semsig_gis.core import SourceError
+from semsig_gis.sources.compression import open_unpacked
 from semsig_gis.sources.filters import as_text
 from semsig_gis.sources.osm.elements import (
     KIND_BY_LETTER,
@@ -45,6 +44,12 @@ if TYPE_CHECKING:
 LONGEST_REMARK = 300
 EXHAUSTED = ("timed out", "out of memory")
 KINDS = frozenset(KIND_BY_LETTER.values())
+# Keys of elements that are no tags, and other names of some.
+OWN_KEYS = frozenset(
+    {"action", "bounds", "center", "center_lat", "center_lon", "changeset", "geometry", "id", "lat",
+     "lon", "members", "nodes", "timestamp", "type", "uid", "user", "version", "visible"}
+)  # fmt: skip
+NAMES_OF_KEYS = {"latitude": "lat", "lng": "lon", "long": "lon", "longitude": "lon"}
 # What only Overpass servers and editors write in XML, and the kinds and numbers of elements.
 NAMES = tuple(
     map(
@@ -92,7 +97,7 @@ class Document:
 def load_document(path: Path, *, where: str) -> Document:
     """Read the elements of a file of JSON or XML; SourceError if it has none of OpenStreetMap."""
     try:
-        with _open(path) as stream:
+        with open_unpacked(path) as stream:
             start = stream.read(START_BYTES)
             stream.seek(0)
             if start.removeprefix(BOM).lstrip().startswith(b"<"):
@@ -112,17 +117,15 @@ def load_document(path: Path, *, where: str) -> Document:
             "server."
         ) from error
     except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
+        whole = not isinstance(error, ValueError)
+        remedy = (
+            "give a list of elements with type, id, lat, lon and tags, or save it as GeoJSON"
+            if whole
+            else "download it again"
+        )
         raise SourceError(
-            f"{where} is not JSON as Overpass servers send it; download it again."
+            f"{where} is not JSON as Overpass servers send it; {remedy}."
         ) from error
-
-
-def _open(path: Path) -> BinaryIO:
-    """Open a file that may be compressed."""
-    suffix = path.suffix.lower()
-    if suffix == ".gz":
-        return cast("BinaryIO", gzip.open(path))
-    return cast("BinaryIO", bz2.open(path)) if suffix == ".bz2" else path.open("rb")
 
 
 def xml_form(path: Path) -> Literal["plain", "versions", "dialect"]:
@@ -134,12 +137,14 @@ def xml_form(path: Path) -> Literal["plain", "versions", "dialect"]:
     last: tuple[bytes, ...] = ()
     rest = b""
     try:
-        with _open(path) as stream:
+        with open_unpacked(path) as stream:
             _check_root(path, stream.read(START_BYTES))
             stream.seek(0)
             while chunk := stream.read(CHUNK_BYTES):
                 text, end, rest = (rest + chunk).rpartition(b">")
                 text += end
+                if b"<action type" in text:  # differences as Overpass servers send them
+                    raise changes_error(path)
                 if any(pattern.search(text) for pattern in DIALECTS):
                     return "dialect"
                 if form == "plain":
@@ -182,20 +187,21 @@ def _parse_json(text: bytes) -> Any:  # noqa: ANN401 - any JSON
 
 
 def _listed(content: Any) -> Iterator[Any]:  # noqa: ANN401 - any JSON
-    """Yield the items of an answer, of several, of a list, or of lists by kind."""
+    """Yield the items of an answer, of several, of a list, of lists by kind, or inside of others."""
     if isinstance(content, list):
-        if not content:
-            raise ValueError
         for item in content:
             yield from item.get("elements", [item])
     elif "elements" in content:
         yield from content["elements"]
+    elif "type" in content:
+        yield content
+    elif lists := [(kind, f"{kind}s") for kind in KINDS if f"{kind}s" in content]:
+        for kind, name in lists:
+            yield from ({"type": kind, **item} for item in content[name])
     else:
-        lists = {kind: content[f"{kind}s"] for kind in KINDS if f"{kind}s" in content}
-        if not lists:
-            yield {**content}
-        for kind, items in lists.items():
-            yield from ({"type": kind, **item} for item in items)
+        for inner in content.values():
+            if isinstance(inner, dict | list):
+                yield from _listed(inner)
 
 
 def _element(item: dict[str, Any]) -> dict[str, Any] | None:
@@ -205,17 +211,24 @@ def _element(item: dict[str, Any]) -> dict[str, Any] | None:
     """
     if item["type"] not in KINDS:
         return None  # for example a count
-    tags, number = item.get("tags"), item["id"]
-    if not isinstance(number, int):
-        number = int(as_text(number).rpartition("/")[2])
+    element = {NAMES_OF_KEYS.get(key, key): value for key, value in item.items()}
+    if not isinstance(element["id"], int):
+        element["id"] = int(as_text(element["id"]).rpartition("/")[2])
+    if "center_lat" in element:
+        element["center"] = {"lat": element["center_lat"], "lon": element["center_lon"]}
+    tags = element.pop("tags", None)
+    if isinstance(tags, str):
+        tags = parse_json(tags)
     if isinstance(tags, list):
         tags = {tag["k"]: tag["v"] for tag in tags}
-    if tags is None:
-        return {**{key: value for key, value in item.items() if key != "tags"}, "id": number}
+    if tags is None:  # or each is a key of its own, in tables
+        tags = {key.removeprefix("tags."): element[key] for key in element.keys() - OWN_KEYS}
+        tags = {key: value for key, value in tags.items() if isinstance(value, str)}
     if not all(isinstance(value, str | int | float | None) for value in tags.values()):
         raise TypeError
-    texts = {key: as_text(value) for key, value in tags.items() if value is not None}
-    return {**item, "id": number, "tags": texts}
+    if tags:
+        element["tags"] = {key: as_text(tag) for key, tag in tags.items() if tag is not None}
+    return element
 
 
 def _current(elements: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -54,7 +54,8 @@ if TYPE_CHECKING:
 
 # Suffixes of OpenStreetMap files, and the names of their formats in pyosmium.
 FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf",
-           ".osh": "xml", ".osh.gz": "xml.gz", ".osh.bz2": "xml.bz2", ".o5m": "o5m"}  # fmt: skip
+           ".osh": "xml", ".osh.gz": "xml.gz", ".osh.bz2": "xml.bz2", ".o5m": "o5m",
+           ".opl": "opl"}  # fmt: skip
 # Suffixes of files with changes only.
 CHANGES = (".osc", ".osc.gz", ".osc.bz2", ".o5c")
 # Columns with all tags of a row: a map, JSON, or text such as '"amenity"=>"bench"'.
