@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import re
 import zipfile
 from dataclasses import dataclass
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Literal
 
+from semsig_gis.core import SourceError
 from semsig_gis.sources import parquet, vector
 from semsig_gis.sources.compression import open_unpacked
+from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.paths import file_stamp
 from semsig_gis.sources.vector.formats import ARCHIVES, CSV, DRIVERS, WORKBOOKS
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from semsig_gis.sources.vector.member import LayerDescription, Member
 
 # Sources with a catalogue of their own.
@@ -24,6 +25,7 @@ SourceFormat = Literal["gbfs", "gtfs", "mapillary"]
 VECTOR_SUFFIXES = ARCHIVES | {
     suffix for suffix, driver in DRIVERS.items() if driver not in {CSV, *WORKBOOKS}
 }
+TABLES = frozenset(suffix for suffix, driver in DRIVERS.items() if driver == CSV)
 # Suffixes of text files of certain sources, which their beginning shows.
 TEXT_SUFFIXES = frozenset(
     {"", ".geojson", ".geojsonl", ".json", ".jsonl", ".ndjson", ".txt", ".xml"}
@@ -51,10 +53,10 @@ MOST_PROBES = 256
 class FileProbe:
     """Format of a data file, its layers with a geometry, and the columns of each layer.
 
-    Only vector files have `layers`, and only these and Parquet files have `columns`.
+    Only vector files have `layers`, and only these, CSV and Parquet files have `columns`.
     """
 
-    format: Literal["osm", "overpass", "parquet", "vector", "other"] | SourceFormat
+    format: Literal["osm", "overpass", "parquet", "table", "vector", "other"] | SourceFormat
     layers: tuple[tuple[Member, LayerDescription], ...] = ()
     columns: tuple[tuple[str, ...], ...] = ()
 
@@ -77,6 +79,10 @@ def _probe(path: Path, suffix: str, stamp: tuple[tuple[int, int, int], ...]) -> 
         return FileProbe(kind)
     if suffix == ".zip" and stamp and _is_feed(path):
         return FileProbe("gtfs")
+    if suffix in TABLES and stamp:
+        with contextlib.suppress(SourceError):  # its reader reports what is wrong
+            file = open_csv(lambda: path.open("rb"), str(path))
+            return FileProbe("table", columns=(file.layouts[file.separator],))
     if suffix not in VECTOR_SUFFIXES or not stamp:
         return FileProbe("other")
     layers = vector.spatial_layers(path)

@@ -136,6 +136,20 @@ JSON: dict[str, Any] = {
     "no tags": [{"type": "node", "id": 9, "lat": 1, "lon": 1, "tags": None}, POINT, WAY],
     "positions as texts": [POINT | {"lat": "48", "lon": "2.0"}, WAY],
     "versions": [POINT | {"version": 1, "lat": 7}, POINT | {"version": 2}, WAY],
+    "lists by kind, with centres": {
+        "nodes": [{"id": 1, "lat": "48", "lon": "2", "tags": BENCH}],
+        "ways": [{"id": 2, "center_lat": 48.5, "center_lon": 2.5, "tags": BENCH}],
+    },
+    "elements inside others": {"result": {"osm": {"elements": [POINT, WAY]}}},
+    "elements by identifier": {"a": POINT, "b": WAY},
+    "other names of coordinates": [
+        {"type": "node", "id": 1, "latitude": 48, "longitude": 2, "tags": BENCH}, WAY
+    ],
+    "tags as keys": [
+        {"type": "node", "id": 1, "lat": 48, "lon": 2, "user": "bench", "amenity": "bench"},
+        {"type": "way", "id": 2, "center": WAY["center"], "tags.amenity": "bench"},
+    ],
+    "tags as text": [POINT | {"tags": json.dumps(BENCH)}, WAY],
     "deleted in an editor": [POINT, WAY, POINT | {"id": 4, "action": "delete"}],
     "not visible": [POINT, WAY, POINT | {"id": 3, "visible": False}],
     "deleted last": [{**POINT, "id": 3, "version": 1}, GONE | {"id": 3}, POINT, WAY],
@@ -162,6 +176,8 @@ def test_json_of_elements_is_read(tmp_path: Path, case: str) -> None:
         ("a.osc.gz", "", ["osmium apply-changes"]),
         ("a.osm", f"<osmChange version='0.6'><create>{NODE}</create></osmChange>", ["changes"]),
         ("a.xml", f"<osmAugmentedDiff><action>{NODE}</action></osmAugmentedDiff>", ["changes"]),
+        ("a.osm", f"<osm><action type='delete'><old>{NODE}</old></action></osm>", ["changes"]),
+        ("a.json", '[{"type": "node", "id": 1, "tags": 5}]', ["save it as GeoJSON"]),
         ("a.osm", f"<osm>{NODE}<remark>runtime error: timed out.</remark></osm>", ["smaller area"]),
         ("a.osm", f"<osm><way id='1'>{CENTRE}", ["not whole XML"]),
         ("a.osm", f"<!DOCTYPE osm []><osm><way id='1'>{CENTRE}</way></osm>", ["document type"]),
@@ -174,6 +190,27 @@ def test_changes_and_incomplete_answers_are_refused(
     path.write_text(text)
     with refused(SourceError, *words):
         load(path)
+
+
+@pytest.mark.parametrize("mark", ["\t", "|", ";", ","])
+@pytest.mark.parametrize("kinds", [True, False])
+def test_table_of_a_server_is_read(tmp_path: Path, mark: str, *, kinds: bool) -> None:
+    rows = [
+        ["@id", "@lat", "@lon", "amenity", "name"],
+        ["1", "48", "2", "bench", ""],
+        ["2", "48.5", "2.5", "bench", "Long"],
+        ["3", "48.5", "2.5", "cafe", ""],
+    ]
+    if kinds:
+        rows = [
+            [kind, *row] for kind, row in zip(["@type", "node", "way", "node"], rows, strict=True)
+        ]
+    path = tmp_path / "answer.csv"
+    path.write_text("".join(f"{mark.join(row)}\n" for row in rows))
+    assert middles(read(path)) == {
+        "node/1": (2, 48),
+        f"{'way' if kinds else 'node'}/2": (2.5, 48.5),
+    }
 
 
 def test_editor_file_is_read_beside_an_extract(tmp_path: Path) -> None:

@@ -104,7 +104,10 @@ def load_document(path: Path, *, where: str) -> Document:
                 elements, remark = _read_xml(stream)
             else:
                 content = _parse_json(stream.read())
-                elements = list(filter(None, map(_element, _listed(content))))
+                items = list(_listed(content))
+                if not items and "elements" not in content:
+                    raise KeyError("elements")
+                elements = list(filter(None, map(_element, items)))
                 remark = content.get("remark", "") if isinstance(content, dict) else ""
         # The remark becomes a part of a sentence.
         remark = " ".join(str(remark).split()).rstrip(".").replace(". ", ", ")
@@ -123,9 +126,7 @@ def load_document(path: Path, *, where: str) -> Document:
             if whole
             else "download it again"
         )
-        raise SourceError(
-            f"{where} is not JSON as Overpass servers send it; {remedy}."
-        ) from error
+        raise SourceError(f"{where} is not JSON as Overpass servers send it; {remedy}.") from error
 
 
 def xml_form(path: Path) -> Literal["plain", "versions", "dialect"]:
@@ -187,7 +188,7 @@ def _parse_json(text: bytes) -> Any:  # noqa: ANN401 - any JSON
 
 
 def _listed(content: Any) -> Iterator[Any]:  # noqa: ANN401 - any JSON
-    """Yield the items of an answer, of several, of a list, of lists by kind, or inside of others."""
+    """Yield the items of an answer, of several, of a list, of lists by kind, or inside others."""
     if isinstance(content, list):
         for item in content:
             yield from item.get("elements", [item])

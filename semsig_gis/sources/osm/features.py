@@ -22,6 +22,7 @@ import shapely
 from semsig_gis.core import CrsError, InputError
 from semsig_gis.sources import parquet, vector
 from semsig_gis.sources.catalog import data_folder, load_catalog
+from semsig_gis.sources.csv_layer import csv_table
 from semsig_gis.sources.filters import as_text
 from semsig_gis.sources.layer import transformed
 from semsig_gis.sources.osm.elements import (
@@ -32,11 +33,13 @@ from semsig_gis.sources.osm.elements import (
     feature_shape,
 )
 from semsig_gis.sources.parquet import read_parquet
-from semsig_gis.sources.probe import probe_file
+from semsig_gis.sources.probe import TABLES, probe_file
 from semsig_gis.sources.rows import (
     WGS84,
     BadFeatureError,
+    Rows,
     built_geometries,
+    choose_crs,
     identifier,
     parse_crs,
     plain,
@@ -44,9 +47,10 @@ from semsig_gis.sources.rows import (
 from semsig_gis.storage import parse_toml
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     import geopandas as gpd
+    from pyproj import CRS
 
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
@@ -76,11 +80,14 @@ KINDS_AND_NUMBERS = (
     ("element_type", "osmid"),
     ("osm_type", "osm_id"),
     ("osm_type", "id"),
+    ("@type", "@id"),
     ("type", "id"),
 )
 # Numbers in tables of GDAL and Geofabrik, without the kind; GDAL has the second one for areas that
 # are ways.
 NUMBER, WAY_NUMBER = "osm_id", "osm_way_id"
+# The same in tables of Overpass servers that do not state the kind.
+NAMELESS = "@id"
 # Columns of Geofabrik's classes.
 CLASS, CODE = "fclass", "code"
 # Tags that most tables lack.
@@ -124,7 +131,7 @@ class FeatureTable:
         names: list[ElementName] = [(None, "")] * size
         # Numbers without a kind (GDAL, osm2pgsql).
         among_areas = WAY_NUMBER in self.columns
-        for row, number in _numbers(self.columns.get(NUMBER)):
+        for row, number in _numbers(self.columns.get(NUMBER, self.columns.get(NAMELESS))):
             # Relations of osm2pgsql have numbers below zero.
             relation = among_areas or number.startswith("-")
             names[row] = ("relation" if relation else None, number.lstrip("-"))
@@ -271,11 +278,15 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
             frame = frame.set_crs(parse_crs(crs))
         yield _frame_table(frame)
         return
-    # A file that the probe does not open as a vector file is refused here with its error.
-    layers = probe_file(path).layers or vector.spatial_layers(path)
-    for rows, system, crs_notes in vector.read_tables(
-        layers, lambda fields: names_read if has_tag_columns(fields) else (), crs=crs
-    ):
+    if path.suffix.lower() in TABLES:
+        tables = iter([_csv_rows(path, specs[0], names_read, crs=crs)])
+    else:
+        # A file that the probe does not open as a vector file is refused here with its error.
+        layers = probe_file(path).layers or vector.spatial_layers(path)
+        tables = vector.read_tables(
+            layers, lambda fields: names_read if has_tag_columns(fields) else (), crs=crs
+        )
+    for rows, system, crs_notes in tables:
         arrays = {name: rows.column(name) for name in rows.columns}
         columns = {
             name: [plain(v) for v in array.to_pylist()] if isinstance(array, pa.Array) else array
@@ -293,6 +304,28 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
             number, text = next(iter(rows.errors.items()))
             notes.append(f"{len(rows.errors):,} rows cannot be read (row {number}: {text})")
         yield FeatureTable(columns, positions, tuple(notes))
+
+
+def _csv_rows(
+    path: Path, spec: LayerSpec, names: Collection[str], *, crs: str | None
+) -> tuple[Rows, CRS, tuple[str, ...]]:
+    """Return the rows of a CSV file with some columns, their CRS, and notes."""
+    table = csv_table(lambda: path.open("rb"), spec, what=str(path), where=str(path))
+    rows = Rows.of(name for name in table.names if name in names)
+    for row in table.rows():
+        if isinstance(row, str):
+            rows.skip(row)
+            continue
+        try:
+            place: Position | str = table.places.read(row) if table.places else None
+        except BadFeatureError as error:
+            place = str(error)
+        rows.add({name: value for name, value in row.items() if value}, "", place)
+    own = table.places.crs if table.places else None
+    system, notes = choose_crs(
+        own or WGS84, implicit=own is None, expected=None, requested=crs, where=str(path)
+    )
+    return rows, system, (*table.file.notes, *notes)
 
 
 def _keys(specs: Sequence[LayerSpec]) -> frozenset[str]:
