@@ -79,6 +79,7 @@ class CsvFile:
         Missing values at the end are None; surplus blank values are left out.
         """
         names = self.layouts[separator]
+        repeated = len({*names}) < len(names)
         for values in itertools.islice(self._values(separator), 1, None):
             if isinstance(values, str):
                 yield values
@@ -86,12 +87,11 @@ class CsvFile:
                 yield f"has {len(values)} values, and the header has {len(names)} names"
             elif values:
                 missing = [None] * (len(names) - len(values))
-                # Of columns with the same name, the first that is not blank counts.
-                row: dict[str, str | None] = {}
-                for name, value in zip(names, [*values[: len(names)], *missing], strict=True):
-                    if not (row.get(name) or "").strip():
-                        row[name] = value if value is not None else row.get(name)
-                yield row
+                pairs = [*zip(names, [*values[: len(names)], *missing], strict=True)]
+                if repeated:  # the first that is not blank counts
+                    pairs.reverse()
+                    pairs += [pair for pair in pairs if (pair[1] or "").strip()]
+                yield dict(pairs)
 
     def text(self) -> IO[str]:
         """Open the file as text, with its ends of lines."""

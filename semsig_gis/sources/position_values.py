@@ -137,7 +137,10 @@ def _letters() -> Mapping[str, tuple[str, int]]:
 
 def coordinate(value: object, *, english: bool = False, o_is_east: bool = False) -> float:
     """Return the number or the angle in degrees that is in a value; ValueError if there is none."""
-    return _angle(value, english=english, o_is_east=o_is_east).value
+    try:
+        return float(value) if isinstance(value, str) else _angle(value).value
+    except ValueError:
+        return _angle(value, english=english, o_is_east=o_is_east).value
 
 
 def is_angle(value: object) -> bool:

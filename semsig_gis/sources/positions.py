@@ -122,7 +122,7 @@ class PositionFields:
             if isinstance(found.position, tuple):
                 return found._replace(position=found.position[::-1])
             return found._replace(position=shapely.transform(found.position, np.fliplr))
-        both = [(name, values.get(name)) for name in self.names]
+        both = [(str(name), values.get(str(name))) for name in (self.x, self.y)]
         if all(_is_blank(value) for _, value in both):
             return None
         numbers = []
