@@ -320,9 +320,20 @@ SMALL_TASK = {
         for item in TASK["predictions"][0]["result"]
     ],
 }
+ROTATED = ("x1", "y1", "x2", "y2", "x3", "y3", "x4", "y4")
 SAMPLES = {
     "COCO": {"street.json": json.dumps(COCO)},
     "COCO (masks)": {"street.json": json.dumps({**COCO, "annotations": MASKS})},
+    "COCO (other identifiers)": {
+        "street.json": json.dumps(
+            {
+                **COCO,
+                "annotations": [
+                    {**item, "image_id": str(item["image_id"])} for item in COCO["annotations"]
+                ],
+            }
+        )
+    },
     "COCO (polygons)": {"street.json": json.dumps({**COCO, "annotations": POLYGONS})},
     "COCO (results)": {
         "results.json": json.dumps([{"score": 1.0, **item} for item in COCO["annotations"]]),
@@ -351,7 +362,24 @@ SAMPLES = {
     "VIA (project)": {"via.json": json.dumps({"_via_settings": {}, "_via_img_metadata": VIA})},
     "VIA (version 1)": {"via.json": json.dumps(VIA_1)},
     "Supervisely": {"street.jpg.json": json.dumps(SUPERVISELY)},
+    "YOLO with data.yaml (key points)": {
+        "labels/street.txt": "0 0.2 0.375 0.2 0.25 0.1 0.3 2 0.2 0.4 1 1.0\n"
+        "1 0.525 0.15 0.05 0.1 0.5 0.1 2 0.5 0.2 0 0.75\n",
+        "own.yaml": "kpt_shape: [2, 3]\nnames: [bench, stop sign]\n",
+    },
     "CSV of Roboflow": {"_annotations.csv": ROBOFLOW},
+    "CSV of Roboflow (in shares)": {
+        "boxes.csv": "image_name,width,height,class_name,x_min,y_min,x_max,y_max\n"
+        "street.jpg,800,400,bench,0.1,0.25,0.3,0.5\n"
+        "street.jpg,800,400,stop sign,0.5,0.1,0.55,0.2\n"
+    },
+    "Pascal VOC (outlines)": {
+        "street.xml": VOC.replace(
+            "<bndbox><xmax>440</xmax><xmin>400</xmin><ymax>80</ymax><ymin>40</ymin></bndbox>",
+            "<polygon><x1>400</x1><y1>40</y1><x2>440</x2><y2>50</y2><x3>410</x3><y3>80</y3>"
+            "</polygon>",
+        )
+    },
     "KITTI label_2": {"street.txt": KITTI},
     "BDD100K": {"bdd100k_labels.json": json.dumps(FRAMES)},
     "BDD100K (Scalabel)": {
@@ -443,6 +471,27 @@ SAMPLES = {
                     "box": {"x1": 400, "y1": 40, "x2": 440, "y2": 80},
                 },
             ]
+        )
+    },
+    "results of Ultralytics or Transformers (rotated, by name)": {
+        "boxes.json": json.dumps(
+            {
+                "street.jpg": [
+                    {"name": name, "confidence": score, "box": corners}
+                    for name, score, corners in (
+                        (
+                            "bench",
+                            1.0,
+                            dict(zip(ROTATED, (80, 100, 240, 100, 240, 200, 80, 200), strict=True)),
+                        ),
+                        (
+                            "stop sign",
+                            0.75,
+                            dict(zip(ROTATED, (400, 60, 420, 40, 440, 60, 420, 80), strict=True)),
+                        ),
+                    )
+                ]
+            }
         )
     },
     "results of Ultralytics or Transformers (of Transformers, in shares)": {

@@ -7,13 +7,20 @@ add its module: `read_pictures`, messages and the tests in
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from semsig_gis.core import InputError, Registry
-from semsig_gis.observation.detectors.documents import INVALID, PARSERS, Document, read_document
+from semsig_gis.observation.detectors.documents import (
+    INVALID,
+    PARSERS,
+    Document,
+    read_document,
+    text_of,
+)
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture
 
 Pictures = Callable[[Document, Sequence[Document]], Iterable[AnnotatedPicture]]
@@ -87,7 +94,12 @@ def read_pictures(
             raise InputError(f"{path} is not in a supported format; {_accepted()}.")
     labels = [document for document in documents if not _has_class_names(document.file)]
     if documents and not labels:  # only names of classes: the labels are in folders next to them
-        files = {file for document in documents for file in _files_in(document.file.parent)}
+        files = {
+            file
+            for document in documents
+            for folder in _folders_of(document.file)
+            for file in _files_in(folder)
+        }
         labels = [item for item in map(read_document, sorted(files)) if _format(item)]
         if not labels:
             names = documents[0].file
@@ -97,6 +109,13 @@ def read_pictures(
     if boxes and all(box.fault for box in boxes):
         raise InputError(f"{boxes[0].fault}; correct the file, or export it again.")
     return pictures, unknown
+
+
+def _folders_of(names: Path) -> list[Path]:
+    """Return the folders where the labels of a file of class names are: its own and its `path`."""
+    path = re.search(r"(?m)^path *: *['\"]?([^'\"#\n]+)", text_of(names))
+    stated = [names.parent / path[1].strip()] if path else []
+    return [names.parent, *(folder for folder in stated if folder.is_dir())]
 
 
 def _accepted() -> str:

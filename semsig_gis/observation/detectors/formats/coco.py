@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,15 +67,25 @@ def _is_results(content: Any) -> bool:  # noqa: ANN401 - any JSON
 def _pictures(
     content: dict[str, Any], annotations: list[Any], source: str
 ) -> list[AnnotatedPicture]:
-    names = {item["id"]: item["name"] for item in content["categories"]}
-    boxes: dict[Any, list[Box]] = {item["id"]: [] for item in content["images"]}
+    # Programs write identifiers as numbers or as text, some the name of the picture.
+    names = {str(item["id"]): item["name"] for item in content["categories"]}
+    boxes: dict[str, list[Box]] = {str(item["id"]): [] for item in content["images"]}
+    stems = {
+        PurePosixPath(str(item.get("file_name"))).stem: str(item["id"])
+        for item in content["images"]
+    }
     others = dict.fromkeys(boxes, 0)
     unlisted = []
     for number, item in enumerate(annotations, start=1):
         where = f"{source}, annotation {number}"
-        image, category = item["image_id"], item["category_id"]
+        if not isinstance(item, dict):
+            unlisted.append(faulty_box(f"{where} is not an object"))
+            continue
+        image, category = str(item["image_id"]), str(item.get("category_id"))
+        image = image if image in boxes else stems.get(image, image)
         if image not in boxes or category not in names:
-            what = f"image {image!r}" if image not in boxes else f"category {category!r}"
+            name = "category_id" if image in boxes else "image_id"
+            what = f"{name.removesuffix('_id')} {item.get(name)!r}"
             unlisted.append(faulty_box(f"{where} is of the {what}, which is not listed"))
             continue
         if item.get("iscrowd"):  # several objects
@@ -95,8 +106,8 @@ def _pictures(
     return [
         AnnotatedPicture(
             name=str(item.get("file_name", item["id"])),
-            boxes=tuple(boxes[item["id"]]),
-            others=others[item["id"]],
+            boxes=tuple(boxes[str(item["id"])]),
+            others=others[str(item["id"])],
             shot=Shot(size=size_of(item.get("width"), item.get("height"))),
         )
         for item in content["images"]
@@ -105,16 +116,16 @@ def _pictures(
 
 def _corners(item: dict[str, Any]) -> Corners | None:
     """Return the box of an annotation, or the box of its outline or mask; None without them."""
-    if item.get("bbox"):
+    shape = item.get("segmentation")
+    if item.get("bbox") and (any(item["bbox"]) or not shape):
         left, top, width, height = item["bbox"]
         return left, top, left + width, top + height
-    shape = item.get("segmentation")
     if isinstance(shape, dict):
         return mask_corners(shape)
     if not shape:
         return None
     parts = shape if isinstance(shape[0], list) else [shape]
-    return bounds(point for part in parts for point in zip(part[::2], part[1::2], strict=True))
+    return bounds(point for part in parts for point in np.reshape(part, (-1, 2)))
 
 
 def mask_corners(mask: dict[str, Any]) -> Corners | None:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
 
 CORNERS = ("xtl", "ytl", "xbr", "ybr")
+MASK = ("left", "top", "width", "height")
+ELLIPSE = ("cx", "cy", "rx", "ry")
 
 
 def matches(content: Any) -> bool:  # noqa: ANN401 - an XML element
@@ -50,6 +52,12 @@ def _picture(image: ET.Element, source: str) -> AnnotatedPicture:
                 corners = turned(corners, angle, ((left + right) / 2, (top + bottom) / 2))
         elif shape.tag == "polygon":
             corners = bounds(point.split(",") for point in shape.attrib["points"].split(";"))
+        elif shape.tag == "mask":
+            left, top, width, height = (float(shape.attrib[key]) for key in MASK)
+            corners = left, top, left + width, top + height
+        elif shape.tag == "ellipse":
+            x, y, across, down = (float(shape.attrib[key]) for key in ELLIPSE)
+            corners = x - across, y - down, x + across, y + down
         else:
             others += shape.tag != "tag"
             continue

@@ -7,8 +7,10 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
+from semsig_gis.observation.detectors.documents import INVALID
 from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
+    NO_CORNERS,
     AnnotatedPicture,
     Shot,
     bounds,
@@ -81,7 +83,10 @@ def _picture(task: dict[str, Any], source: str) -> AnnotatedPicture:
             others += kind.endswith("labels")
             continue
         label = value[kind][0] if value.get(kind) else "no label"
-        corners = _corners(value, size or (1, 1))
+        try:
+            corners = _corners(value, size or (1, 1))
+        except INVALID:
+            corners = NO_CORNERS
         boxes.append(box_of(label, corners, where, score=item.get("score")))
     values = [text for text in task["data"].values() if isinstance(text, str)]
     address = str(task["data"].get("image") or next(iter(values), task.get("id", "?")))

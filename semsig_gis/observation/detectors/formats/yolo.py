@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -31,6 +33,8 @@ NAME_KEYS = ("names", "id2label", "categories")
 """Where YOLO, Transformers and COCO have the names of classes."""
 
 BOX_VALUES = 4
+DOTA_WORDS = 10  # eight numbers, a name and a mark
+NUMBER = re.compile(r"-?\d*\.?\d+(?:[eE][-+]?\d+)?")
 LEAST_WORDS = 4  # a line with fewer is of another kind of text
 
 
@@ -42,8 +46,10 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
     return (
         len(words) >= LEAST_WORDS
         and not words[0].endswith(":")
-        and "." not in words[0]
-        and all(word.lstrip("-").replace(".", "", 1).isdecimal() for word in (words[1], words[-1]))
+        and "." not in words[0].removesuffix(".0")
+        and NUMBER.fullmatch(words[1]) is not None
+        and NUMBER.fullmatch(words[-1]) is not None
+        and (len(words) != DOTA_WORDS or NUMBER.fullmatch(words[-2]) is not None)
     )
 
 
@@ -51,13 +57,17 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
 def pictures(document: Document, documents: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture that is named as the file."""
     file = document.file
-    labels = _names(file, documents) if any(document.content) else {}
+    source = _names_file(file, documents) if any(document.content) else None
+    labels = read_class_names(source) if source else {}
+    keypoints = _keypoints(source) if source else 0
     boxes = []
     for number, words in enumerate(document.content, start=1):
         if not words:
             continue
         try:
-            boxes.append(_box(words, labels, f"{file}, line {number}"))
+            # Key points stand between the box and its score.
+            own = [*words[: BOX_VALUES + 1], *words[BOX_VALUES + 1 + keypoints :]]
+            boxes.append(_box(own, labels, f"{file}, line {number}"))
         except InputError as error:
             boxes.append(faulty_box(str(error).rstrip(".")))
     return [AnnotatedPicture(name=file.stem, boxes=tuple(boxes), shares=True)]
@@ -65,16 +75,15 @@ def pictures(document: Document, documents: Sequence[Document]) -> list[Annotate
 
 def _box(words: Sequence[str], labels: Mapping[int, str], where: str) -> Box:
     """Return the box of a line; InputError if it has none."""
-    if len(words) <= BOX_VALUES or not words[0].isdecimal():
+    number = words[0].removesuffix(".0")
+    if len(words) <= BOX_VALUES or not number.isdecimal():
         raise InputError(
             f"{where} is not a line of YOLO labels; write class, x, y, width, height (and score)."
         )
-    if int(words[0]) not in labels:
-        raise InputError(
-            f"{where} is of class {words[0]}, which has no name; list it in data.yaml."
-        )
+    if int(number) not in labels:
+        raise InputError(f"{where} is of class {number}, which has no name; list it in data.yaml.")
     corners, score = _corners(words[1:], where)
-    return box_of(labels[int(words[0])], corners, where, score=score)
+    return box_of(labels[int(number)], corners, where, score=score)
 
 
 def _corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None]:
@@ -104,16 +113,30 @@ def _corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None]:
     return corners, score
 
 
-def _names(file: Path, documents: Sequence[Document]) -> dict[int, str]:
-    """Return the names of classes by number, from a file that was given or is near the labels."""
+def _names_file(file: Path, documents: Sequence[Document]) -> Path:
+    """Return the file of class names that was given, or is near the labels."""
     own = (document.file for document in documents if document.content is None)
     near = (folder / name for folder in file.absolute().parents[:LEVELS] for name in NAME_FILES)
     source = next(own, None) or next((path for path in near if path.is_file()), None)
+    if source is None:  # a file of another name, if there is one only
+        others = [
+            path
+            for folder in file.absolute().parents[:LEVELS]
+            for path in [*folder.glob("*.yaml"), *folder.glob("*.yml")]
+            if re.search(r"(?m)^names *:", text_of(path))
+        ]
+        source = others[0] if len(others) == 1 else None
     if source is None:
         raise InputError(
             f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
         )
-    return read_class_names(source)
+    return source
+
+
+def _keypoints(source: Path) -> int:
+    """Return the number of values of key points in a line; 0 without key points."""
+    shape = re.search(r"(?m)^kpt_shape *: *\[ *(\d+) *, *(\d+) *\]", text_of(source))
+    return math.prod(map(int, shape.groups())) if shape else 0
 
 
 def read_class_names(source: Path) -> dict[int, str]:
