@@ -131,8 +131,8 @@ def write_case(
 def bearings() -> list[float]:
     """Return the bearings of the view that was written."""
     (view,) = map(json.loads, Path("v.jsonl").read_text().splitlines())
-    found: list[float] = view["bearings"]
-    return found
+    numbers: list[float] = view["bearings"]
+    return numbers
 
 
 @pytest.mark.parametrize(

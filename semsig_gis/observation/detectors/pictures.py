@@ -110,10 +110,10 @@ class AnnotatedPicture:
     def names(self) -> tuple[str, ...]:
         """The names of its file, best first: as given, without folders, without the suffix."""
         address = urlsplit(self.name) if "://" in self.name or "?" in self.name else None
-        given = self.name
+        place = self.name
         if address:
-            given = parse_qs(address.query).get("d", [address.path])[0]
-        path = PurePosixPath(unquote(given).replace("\\", "/"))
+            place = parse_qs(address.query).get("d", [address.path])[0]
+        path = PurePosixPath(unquote(place).replace("\\", "/"))
         names = [self.name, str(path), path.name]
         if original := ROBOFLOW.fullmatch(path.name):
             names += [f"{original[1]}.{original[2]}"] if original[2] else []

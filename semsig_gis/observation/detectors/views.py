@@ -277,17 +277,17 @@ class ViewBuilder:
             for path in (folder / name for name in picture.names):
                 if path.is_file():
                     return [path]
-                if found := self._listing(path.parent).get(_key(path.name)):
-                    return found
+                if files := self._listing(path.parent).get(_key(path.name)):
+                    return files
             for name in picture.names if self.folders else ():
-                found = self._listing(folder, deep=True).get(_key(name), [])
-                if len(found) > 1:
+                files = self._listing(folder, deep=True).get(_key(name), [])
+                if len(files) > 1:
                     raise InputError(
-                        f"{picture.name} may be {found[0]} or {found[1]}; give the folder of the "
+                        f"{picture.name} may be {files[0]} or {files[1]}; give the folder of the "
                         "right one as --images."
                     )
-                if found:
-                    return found
+                if files:
+                    return files
         return []
 
     def _listing(self, folder: Path, *, deep: bool = False) -> dict[str, list[Path]]:
