@@ -382,6 +382,7 @@ def test_marks_keep_their_numbers_in_sorted_views(bench: Workbench) -> None:
         ({"mark": {"x": None}}, "mark"),
         ({"mark": {"box": [1, 2]}}, "box"),
         ({"mark": {"range": "afar"}}, "afar"),
+        ({"mark": {"range": 1e-30}}, "a range is 1e-30; give a number from 0.01"),
     ],
 )
 def test_invalid_question_is_refused(page: Page, change: dict[str, Any], word: str) -> None:
