@@ -271,7 +271,7 @@ def _towns(layers: Sequence[RawLayer]) -> Iterator[str]:
 def _loaded(lines: Sequence[str], path: Path) -> tuple[RawLayer, ...]:
     """Return the layers that are read with a draft; SourceError if the file does not load."""
     layers: tuple[RawLayer, ...] = ()
-    lost: list[LayerReport] = []
+    far: list[LayerReport] = []
     with temporary_folder(Path(tempfile.gettempdir())) as folder:
         file = folder / "draft.toml"
         file.write_text("\n".join(lines), encoding="utf-8")
@@ -279,14 +279,14 @@ def _loaded(lines: Sequence[str], path: Path) -> tuple[RawLayer, ...]:
             catalog = load_catalog(file)
             layers, _ = read_files(catalog.layers, [path])
             # A file may have layers without rows, but not only these.
-            placed = {
+            with_positions = {
                 files: any(layer.table.geometry.notna().any() for layer in of_files)
                 for files, of_files in itertools.groupby(layers, lambda layer: layer.spec.files)
             }
-            empty = not all(placed.values())
+            empty = not all(with_positions.values())
             if not empty and any(layer.spec.role == "objects" for layer in layers):
                 report = assemble(layers, catalog).report.layers
-                lost = [item for item in report if item.counts.misplaced and not item.counts.kept]
+                far = [item for item in report if item.counts.misplaced and not item.counts.kept]
         except EmptyResultError:
             empty = True
         except SemsigError as error:
@@ -296,9 +296,9 @@ def _loaded(lines: Sequence[str], path: Path) -> tuple[RawLayer, ...]:
     if empty:
         bad = next((f" ({layer.errors[0]})" for layer in layers if layer.errors), "")
         raise SourceError(f"{path} has no layer with positions{bad}; give a file that has one.")
-    if lost and is_folder(path):
+    if far and is_folder(path):
         raise SourceError(
-            f"layer {lost[0].name!r} lies far from all others; look at its coordinate system and "
+            f"layer {far[0].name!r} lies far from all others; look at its coordinate system and "
             "at the order of its coordinates."
         )
     return layers
@@ -505,17 +505,17 @@ def _identifier(draft: LayerDraft) -> Iterator[str]:
 
 def _place(draft: LayerDraft) -> Iterator[str]:
     """Yield the lines with the fields of positions and the CRS."""
-    found = draft.positions
-    if found is not None:
-        questions = found.questions if found.sure else ("by their values only", *found.questions)
+    fields = draft.positions
+    if fields is not None:
+        questions = fields.questions if fields.sure else ("by their values only", *fields.questions)
         comment = f"  # {EDIT}: {_plain('; '.join(questions))}" if questions else ""
-        if found.field is not None:
-            yield f"geometry_field = {_text(found.field)}{comment}"
-            if found.order is not None:
-                yield f"axis_order = {_text(found.order)}"
+        if fields.field is not None:
+            yield f"geometry_field = {_text(fields.field)}{comment}"
+            if fields.order is not None:
+                yield f"axis_order = {_text(fields.order)}"
         else:
-            yield f"x_field = {_text(str(found.x))}{comment}"
-            yield f"y_field = {_text(str(found.y))}"
+            yield f"x_field = {_text(str(fields.x))}{comment}"
+            yield f"y_field = {_text(str(fields.y))}"
     if draft.crs is None:
         return
     try:

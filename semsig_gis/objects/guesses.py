@@ -117,8 +117,8 @@ def _table_sample(path: Path) -> LayerSample:
     position_fields = {fold(field) for field in table.fields} & {fold(SHAPE), fold(POINT)}
     kind = "wfs" if path.suffix.lower() == ".gml" else "opendatasoft"
     placed = any(record.geometry for record in first) or bool(position_fields)
-    found = None if placed else find_positions(table.fields, rows, subject=path.stem)
-    return LayerSample(kind, info, rows, placed, found)
+    positions = None if placed else find_positions(table.fields, rows, subject=path.stem)
+    return LayerSample(kind, info, rows, placed, positions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +190,7 @@ class ClassGuess:
     """Guessed class of a layer, or its role if `is_role`; the name is empty without a guess.
 
     `others` are further possible classes; `sure` is whether the guess is certain, and `by_values`
-    whether it is from the values of a field, of which others may name no class.
+    whether it is from values of a field, which may have others.
     """
 
     name: str = ""

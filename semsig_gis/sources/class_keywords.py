@@ -35,6 +35,7 @@ PREPOSITIONS = frozenset(
     {"about", "d", "da", "das", "de", "degli", "dei", "del", "dell", "della", "delle", "der", "des",
      "di", "do", "dos", "du", "for", "fur", "of", "on", "para", "per", "pour", "sur", "van", "von"}
 )  # fmt: skip
+CONJUNCTIONS = frozenset({"and", "e", "et", "und", "y"})
 # Endings of the plural and of other forms of a keyword; Italian and some other keywords are stems.
 ENDINGS = frozenset(
     {"", "a", "al", "as", "e", "ed", "ee", "ees", "elle", "en", "er", "ern", "es", "i", "ia", "ici",
@@ -119,13 +120,14 @@ class Keywords:
         ]
         # Python's sort keeps the order of the file among keywords of the same length.
         spans.sort(key=lambda span: (-span.letters, span.start))
+        matches = {word for span in spans for word in words[span.start : span.end]}
         best: dict[str, Match] = {}
         for span in spans:
             if span.name and not any(
                 other.start <= span.start and span.end <= other.end and other.letters > span.letters
                 for other in spans
             ):
-                doubt = self._doubt(span, words, text)
+                doubt = self._doubt(span, words, text, matches)
                 match = Match(
                     span.name, " ".join(words[span.start : span.end]), span.letters, doubt
                 )
@@ -133,12 +135,14 @@ class Keywords:
                     best[span.name] = match
         return tuple(sorted(best.values(), key=lambda match: match.doubt != ""))
 
-    def _doubt(self, span: _Span, words: tuple[str, ...], text: str) -> str:
+    def _doubt(
+        self, span: _Span, words: tuple[str, ...], text: str, matches: Container[str]
+    ) -> str:
         """Return the word that may say what a text is about in place of a keyword, or nothing."""
         near = _neighbours()
         last = words[span.end - 1]
-        if span.rest and span.rest.removeprefix("s").removeprefix("n") not in near.same:
-            return last  # a compound
+        if span.rest and not {span.rest, span.rest[1:]} & near.same:
+            return last  # a compound, perhaps with a letter between its parts
         others = (*words[: span.start], *words[span.end :])
         if doubt := next((word for word in others if word in near.other), ""):
             return doubt
@@ -146,7 +150,13 @@ class Keywords:
         singular = last.endswith(span.phrase[-1]) and not last.endswith("s")
         if singular and span.phrase in self.before_heads and _says_more(following):
             return following
+        # "hydrants and valves"; words of other keywords are found as such
         every = _all_words(text)
+        for first, link, second in zip(every, every[1:], every[2:], strict=False):
+            if link in CONJUNCTIONS and {first, second} & {words[span.start], last}:
+                (other,) = {first, second} - {words[span.start], last} or {""}
+                if _says_more(other) and other not in matches:
+                    return other
         for head, link, word in zip(every, every[1:], every[2:], strict=False):
             # "cabinets of signals"
             if (head, word) == (*words[span.start - 1 : span.start], words[span.start]):
@@ -262,14 +272,14 @@ def class_codes(word: str, taxonomy: Taxonomy) -> tuple[int, ...]:
     word : str
         A symbol, a name or a title of the taxonomy, or a family of it, another word for these, in
         the singular or the plural, or a tag of OpenStreetMap such as ``highway=street_lamp``; ``?``
-        or ``unknown`` where the class is not known.
+        or ``unknown`` where the class is not matches.
     taxonomy : Taxonomy
         The classes.
 
     Returns
     -------
     tuple of int
-        One code, or those of all classes of a family; `WILDCARD` where the class is not known.
+        One code, or those of all classes of a family; `WILDCARD` where the class is not matches.
 
     Raises
     ------
