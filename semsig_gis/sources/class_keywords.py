@@ -272,14 +272,14 @@ def class_codes(word: str, taxonomy: Taxonomy) -> tuple[int, ...]:
     word : str
         A symbol, a name or a title of the taxonomy, or a family of it, another word for these, in
         the singular or the plural, or a tag of OpenStreetMap such as ``highway=street_lamp``; ``?``
-        or ``unknown`` where the class is not matches.
+        or ``unknown`` where the class is not known.
     taxonomy : Taxonomy
         The classes.
 
     Returns
     -------
     tuple of int
-        One code, or those of all classes of a family; `WILDCARD` where the class is not matches.
+        One code, or those of all classes of a family; `WILDCARD` where the class is not known.
 
     Raises
     ------
