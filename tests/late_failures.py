@@ -52,7 +52,7 @@ def failures(
 
 
 class _FailingSystem:
-    """System calls, of which those from `first` to `first + number` fail."""
+    """System calls; those from `first` to `first + number` fail."""
 
     def __init__(self, first: int, number: int) -> None:
         self.made, self.failed = 0, range(first + 1, first + 1 + number)
@@ -81,18 +81,18 @@ def assert_true(
     next writer, and other leftovers are named in the message.
     """
     message = "" if error is None else str(error)
-    kept = re.search(rf" is in (\S*{re.escape(TEMPORARY_PREFIX)}\S*);", message)
-    if kept:
-        assert os.path.lexists(kept[1]), message
+    backup = re.search(rf" is in (\S*{re.escape(TEMPORARY_PREFIX)}\S*);", message)
+    if backup:
+        assert os.path.lexists(backup[1]), message
     remove_abandoned(folder)
     left = {path.name for path in folder.iterdir()} - names
     assert all(name in message for name in left), (left, message)
     if error is not None:
         assert_sentence(error, os.strerror(errno.EIO))
-    found = state()
+    content = state()
     if error is None or " is written" in message:
-        assert found == "new", message
-    elif "unchanged" in message or "cannot be written" in message or kept:
-        assert found == "old", message
+        assert content == "new", message
+    elif "unchanged" in message or "cannot be written" in message or backup:
+        assert content == "old", message
     else:
         raise AssertionError(message)

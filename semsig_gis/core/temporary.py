@@ -157,9 +157,9 @@ def _remove(folder: Path, lock: int) -> None:
 def place_locked(target: Path) -> Iterator[bool]:
     """Lock the name of a file or folder for this process; give whether that succeeded.
 
-    If another process of this machine has locked it, wait, and after a few seconds warn for whom.
-    It does not succeed where files cannot be locked, or the parent folder is not writable. The
-    block must not lock the same name again.
+    If another process of this machine has locked it, wait, and after a few seconds name it in a
+    warning. It does not succeed where files cannot be locked, or the parent folder is not writable.
+    The block must not lock the same name again.
     """
     name = hashlib.blake2b(os.fsencode(target.name), digest_size=8).hexdigest()
     folder = target.with_name(f"{MACHINE_PREFIX}{name}")
@@ -199,8 +199,8 @@ def _lock_folder(folder: Path, target: Path) -> int | None:
                 with contextlib.suppress(OSError):  # a full disk
                     os.truncate(lock, 0)
                     os.write(lock, f"{os.getpid()} {time.time():.0f}".encode())
-                kept, lock = lock, -1
-                return kept
+                result, lock = lock, -1
+                return result
         finally:
             if lock >= 0:
                 os.close(lock)

@@ -285,8 +285,8 @@ def cells_checksum(database: SignatureDatabase) -> str:
     """Return 16 hexadecimal digits that change with any cell or signature."""
     checksum = hashlib.blake2b(digest_size=8)
     extents = [] if database.extent_units is None else [database.extent_units]
-    seen = (database.codes, database.bearing_units, database.distance_units, *extents)
-    for array in (database.columns, database.rows, database.offsets, *seen):
+    entries = (database.codes, database.bearing_units, database.distance_units, *extents)
+    for array in (database.columns, database.rows, database.offsets, *entries):
         checksum.update(np.ascontiguousarray(array).data)
     return checksum.hexdigest()
 

@@ -538,8 +538,8 @@ def current_store(database: Path) -> Path:
     final = store_path(database)
     if not _awaited(database):
         return final
-    with contextlib.suppress(InputError), place_locked(final) as alone:
-        if alone:
+    with contextlib.suppress(InputError), place_locked(final) as is_locked:
+        if is_locked:
             _settle(database)
     return _waiting(final) if _awaited(database) else final
 

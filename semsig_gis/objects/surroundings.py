@@ -101,8 +101,8 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
 def _save(table: gpd.GeoDataFrame, path: str | Path, marks: dict[str, Any]) -> None:
     """Save buildings or streets with some more `attrs`."""
     ordered = table.iloc[hilbert_order(table.bounds.to_numpy())]
-    kept = {key: table.attrs[key] for key in table.attrs if key not in {GROUND, RUN}}
-    ordered.attrs = kept | marks
+    attributes = {key: table.attrs[key] for key in table.attrs if key not in {GROUND, RUN}}
+    ordered.attrs = attributes | marks
     with whole_file(path) as partial:
         ordered.to_parquet(
             partial,
@@ -358,8 +358,8 @@ def _read(
         import pandas as pd  # noqa: PLC0415 - 0.4 s
 
         widths = pd.to_numeric(table[HALF_WIDTH], errors="coerce").astype(np.float64)
-        if remark is not None and (lost := int((widths.isna() & table[HALF_WIDTH].notna()).sum())):
-            remark(f"{where}: {HALF_WIDTH} is no number in {lost:,} rows, and not used there")
+        if remark is not None and (wrong := int((widths.isna() & table[HALF_WIDTH].notna()).sum())):
+            remark(f"{where}: {HALF_WIDTH} is no number in {wrong:,} rows, and not used there")
         table[HALF_WIDTH] = widths
     return table.to_crs(parse_crs(crs))
 

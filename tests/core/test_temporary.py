@@ -85,7 +85,7 @@ def test_folder_that_cannot_be_created_raises(tmp_path: Path, name: str) -> None
         pytest.fail("the block must not run")
 
 
-def test_a_place_is_locked_for_one_writer_and_others_learn_for_whom_they_wait(
+def test_a_place_is_locked_for_one_writer_and_others_name_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(temporary, "PATIENCE_S", 0.1)
@@ -93,8 +93,8 @@ def test_a_place_is_locked_for_one_writer_and_others_learn_for_whom_they_wait(
     ready, ended = threading.Event(), threading.Event()
 
     def hold() -> None:
-        with place_locked(place) as alone:
-            order.append(alone)
+        with place_locked(place) as is_locked:
+            order.append(is_locked)
             ready.set()
             ended.wait(10)
             order.append(2)
@@ -106,8 +106,8 @@ def test_a_place_is_locked_for_one_writer_and_others_learn_for_whom_they_wait(
         remove_abandoned(tmp_path)  # not a folder of a process at work
     threading.Timer(0.3, ended.set).start()
     owner = rf"process {os.getpid()}, at work since .* {place}$"
-    with pytest.warns(UserWarning, match=owner), place_locked(place) as alone:
-        order.append(3 * alone)
+    with pytest.warns(UserWarning, match=owner), place_locked(place) as is_locked:
+        order.append(3 * is_locked)
     holder.join()
     assert order == [1, 2, 3]
     assert list(tmp_path.iterdir()) == []

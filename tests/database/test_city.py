@@ -469,11 +469,11 @@ def test_a_store_without_the_ground_of_its_database_is_refused(tmp_path: Path) -
         manifest.write_text(json.dumps(content | {"files": files}))
         with refused(DatabaseError, name, "damaged"):
             open_store(path)
-        kept = (store_path(path) / name).rename(tmp_path / name)
+        moved_file = (store_path(path) / name).rename(tmp_path / name)
         with refused(DatabaseError, f"lacks the {what} that the database was built with"):
             open_store(path)
         assert open_city(path).objects is None
-        kept.rename(store_path(path) / name)
+        moved_file.rename(store_path(path) / name)
     manifest.write_text(json.dumps(content))
     assert open_store(path).streets is not None
 

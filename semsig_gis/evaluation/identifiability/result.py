@@ -392,11 +392,11 @@ def _parsed(
 
     def rows(name: str) -> np.ndarray:
         cells = table[name]
-        known = cells.fill_null(ids[0]).to_numpy()
-        found = np.minimum(np.searchsorted(ids, known), len(ids) - 1)
-        if not np.array_equal(ids[found], known):
+        numbers_of = cells.fill_null(ids[0]).to_numpy()
+        places_of = np.minimum(np.searchsorted(ids, numbers_of), len(ids) - 1)
+        if not np.array_equal(ids[places_of], numbers_of):
             raise ValueError(f"its column {name} names cells that are not in the database")
-        return np.where(cells.is_valid().to_numpy(), found, -1)
+        return np.where(cells.is_valid().to_numpy(), places_of, -1)
 
     return Identifiability(
         database=database,

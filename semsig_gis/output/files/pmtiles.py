@@ -136,11 +136,11 @@ def _tiles(layer: Layer, zoom: int, scratch: Path) -> Iterator[tuple[int, bytes]
 def _expected(layer: Layer, zoom: int) -> set[int]:
     """Return the ids of the tiles that have the centre of a row."""
     to_map, side = Transformer.from_crs(layer.crs, "EPSG:3857", always_xy=True), 1 << zoom
-    found: set[int] = set()
+    ids: set[int] = set()
     for block in layer.blocks():
         centres = shapely.get_coordinates(shapely.centroid(shapely.from_wkb(block[GEOMETRY])))
         x, y = to_map.transform(*centres.T)
         columns, rows = (np.array([x, -y]) / EQUATOR + 0.5) * side
         tiles = np.unique(np.floor(np.stack([columns, rows], axis=1)).astype(np.int64), axis=0)
-        found.update(zxy_to_tileid(zoom, *tile) for tile in tiles.tolist())
-    return found
+        ids.update(zxy_to_tileid(zoom, *tile) for tile in tiles.tolist())
+    return ids

@@ -197,8 +197,8 @@ def _changes(
         older = "was written by an older version, which did not count its rows"
         return [f"{path} {older}, so it is not known whether some are lost"]
     again = "if that is not on purpose, export the database again"
-    if lost := int(specs[EXPORTED]) - rows:
-        more = f"{lost:,} fewer" if lost > 0 else f"{-lost:,} more"
+    if fewer := int(specs[EXPORTED]) - rows:
+        more = f"{fewer:,} fewer" if fewer > 0 else f"{-fewer:,} more"
         return [f"the layer {layer} of {path} has {rows:,} rows, {more} than exported; {again}"]
     if checksum is not None and checksum != specs[CHECKSUM]:
         return [f"the layer {layer} of {path} was changed after it was exported; {again}"]

@@ -555,8 +555,8 @@ def test_cells_deleted_and_objects_added_in_qgis_are_read(tmp_path: Path) -> Non
     assert_same(database.select(database.lengths >= 3), contents.database)
     assert contents.identifiability is None
     assert "other signatures" in contents.notes[0]
-    gone = int((database.lengths < 3).sum())
-    assert f"{gone:,} fewer than exported" in contents.notes[1]
+    fewer = int((database.lengths < 3).sum())
+    assert f"{fewer:,} fewer than exported" in contents.notes[1]
     assert "objects" in contents.notes[2]
     assert "1 more than exported" in contents.notes[2]
     assert contents.objects is not None

@@ -65,18 +65,16 @@ def test_tiles_contain_every_cell(file: Path) -> None:
     assert cells.geometry.centroid.distance(middles).max() < 0.5
 
 
-@pytest.mark.parametrize(
-    "lost", ["1", "zoom_level = 15", "tile_id IN (SELECT max(tile_id) FROM map)"]
-)
+@pytest.mark.parametrize("statement", ["DELETE FROM tiles", "DELETE FROM tiles WHERE rowid = 1"])
 def test_tiles_that_gdal_loses_without_an_error_are_noticed(
-    lost: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    statement: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As on a full disk, where GDAL may end without an error."""
 
     def losing(layer: Layer, path: Path, *arguments: Any, **options: Any) -> None:  # noqa: ANN401
         write_features(layer, path, *arguments, **options)
         with closing(sqlite3.connect(path)) as tiles, tiles:
-            tiles.execute(lost)
+            assert tiles.execute(statement).rowcount
 
     path = tmp_path / "city.pmtiles"
     path.write_bytes(b"old")
