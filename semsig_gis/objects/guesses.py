@@ -28,6 +28,7 @@ from semsig_gis.sources import (
     fold,
     keywords,
     open_table,
+    probe_file,
     tagged_class,
     words_of,
 )
@@ -73,13 +74,15 @@ class LayerSample:
 def sample_layers(path: Path) -> tuple[LayerSample, ...]:
     """Return samples of the layers of a file; SourceError if no catalogue can be made of it."""
     suffix = path.suffix.lower()
-    is_osm = path.name.lower().endswith(tuple(FORMATS))
+    is_osm, is_gbfs = path.name.lower().endswith(tuple(FORMATS)), False
     with contextlib.suppress(SourceError):  # a table of a portal
-        is_osm = is_osm or file_reader(path) == "overpass"
-    if is_osm:
+        is_osm = is_osm or file_reader(path) in {"osm_file", "overpass"}
+        is_gbfs = probe_file(path).format == "gbfs"
+    if is_osm or is_gbfs:
+        what, name = ("OpenStreetMap data", "openstreetmap") if is_osm else ("a GBFS feed", "gbfs")
         raise SourceError(
-            f"{path} is OpenStreetMap data, and no catalogue is needed: `semsig load "
-            f"{shlex.quote(str(path))}` reads it with the built-in one, 'openstreetmap'."
+            f"{path} is {what}, and no catalogue is needed: `semsig load "
+            f"{shlex.quote(str(path))}` reads it with the built-in one, {name!r}."
         )
     layers: tuple[LayerSample, ...] = ()
     try:

@@ -10,7 +10,7 @@ import pytest
 from sentences import refused
 
 from semsig_gis.core import SourceError
-from semsig_gis.objects import load
+from semsig_gis.objects import draft_catalog, load
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,6 +58,8 @@ def test_stations_of_bicycles_are_read(
     feed = {"last_updated": 1, "ttl": 10, "version": "3.0", "data": {"stations": stations}}
     path.write_text(json.dumps(feed, indent=1))
     assert kinds(path) == dict.fromkeys(ids, "bike_station")
+    with refused(SourceError, "no catalogue is needed", "gbfs"):
+        draft_catalog(path)
     # Numbers of stations are those of their feed.
     path.rename(tmp_path / "station_information.json")
     (tmp_path / "other").mkdir()

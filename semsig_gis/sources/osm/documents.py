@@ -104,10 +104,7 @@ def load_document(path: Path, *, where: str) -> Document:
                 elements, remark = _read_xml(stream)
             else:
                 content = _parse_json(stream.read())
-                items = list(_listed(content))
-                if not items and "elements" not in content:
-                    raise KeyError("elements")
-                elements = list(filter(None, map(_element, items)))
+                elements = _json_elements(content)
                 remark = content.get("remark", "") if isinstance(content, dict) else ""
         # The remark becomes a part of a sentence.
         remark = " ".join(str(remark).split()).rstrip(".").replace(". ", ", ")
@@ -203,6 +200,14 @@ def _listed(content: Any) -> Iterator[Any]:  # noqa: ANN401 - any JSON
         for inner in content.values():
             if isinstance(inner, dict | list):
                 yield from _listed(inner)
+
+
+def _json_elements(content: Any) -> list[dict[str, Any]]:  # noqa: ANN401 - any JSON
+    """Return the elements in JSON; KeyError if it has no list of them."""
+    items = list(_listed(content))
+    if not items and "elements" not in content:
+        raise KeyError("elements")
+    return list(filter(None, map(_element, items)))
 
 
 def _element(item: dict[str, Any]) -> dict[str, Any] | None:
