@@ -510,6 +510,92 @@ SAMPLES = {
             ]
         )
     },
+    "answers of Rekognition, Vision or Roboflow": {
+        "street.json": json.dumps(
+            {
+                "predictions": [
+                    {"x": 160, "y": 150, "width": 160, "height": 100, "class": "bench"},
+                    {
+                        "x": 420,
+                        "y": 60,
+                        "width": 40,
+                        "height": 40,
+                        "class": "stop sign",
+                        "confidence": 0.75,
+                    },
+                ]
+            }
+        )
+    },
+    "answers of Rekognition, Vision or Roboflow (of Rekognition)": {
+        "street.json": json.dumps(
+            {
+                "Labels": [
+                    {"Name": "City", "Confidence": 99.0},
+                    *(
+                        {
+                            "Name": name,
+                            "Instances": [
+                                {
+                                    "BoundingBox": dict(
+                                        zip(("Left", "Top", "Width", "Height"), sides, strict=True)
+                                    ),
+                                    "Confidence": 100 * score,
+                                }
+                            ],
+                        }
+                        for name, score, sides in (
+                            ("bench", 1.0, (0.1, 0.25, 0.2, 0.25)),
+                            ("stop sign", 0.75, (0.5, 0.1, 0.05, 0.1)),
+                        )
+                    ),
+                ]
+            }
+        )
+    },
+    "answers of Rekognition, Vision or Roboflow (of Vision)": {
+        "street.json": json.dumps(
+            {
+                "responses": [
+                    {
+                        "localizedObjectAnnotations": [
+                            {
+                                "name": name,
+                                "score": score,
+                                "boundingPoly": {
+                                    "normalizedVertices": [{"x": x, "y": y} for x, y in points]
+                                },
+                            }
+                            for name, score, points in (
+                                ("bench", 1.0, [(0.1, 0.25), (0.3, 0.25), (0.3, 0.5)]),
+                                ("stop sign", 0.75, [(0.5, 0.1), (0.55, 0.2), (0.5, 0.2)]),
+                            )
+                        ]
+                    }
+                ]
+            }
+        )
+    },
+    "Darwin": {
+        "street.json": json.dumps(
+            {
+                "version": "2.0",
+                "item": {"name": "street.jpg", "slots": [{"width": 800, "height": 400}]},
+                "annotations": [
+                    {"name": "bench", "bounding_box": {"x": 80, "y": 100, "w": 160, "h": 100}},
+                    {
+                        "name": "stop sign",
+                        "polygon": {
+                            "paths": [
+                                [{"x": 400, "y": 40}, {"x": 440, "y": 50}, {"x": 410, "y": 80}]
+                            ]
+                        },
+                        "inference": {"confidence": 0.75},
+                    },
+                ],
+            }
+        )
+    },
     "Panoramax": {"item.json": json.dumps(ITEM)},
     "Panoramax (search)": {
         "items.json": json.dumps({"type": "FeatureCollection", "features": [ITEM]})
@@ -517,7 +603,7 @@ SAMPLES = {
 }
 # Formats without scores, without sizes, with marks of hidden objects, and with other shapes.
 NO_SCORES = ("Mapillary", "VIA", "CSV")
-NO_SIZES = ("YOLO", "KITTI", "VIA", "results")
+NO_SIZES = ("YOLO", "KITTI", "VIA", "results", "answers")
 WITH_HIDDEN = ("CVAT", "Datumaro", "Pascal", "Supervisely", "KITTI", "BDD100K")
 WITH_OTHERS = ("Label", *WITH_HIDDEN, "VIA", "Panoramax")
 OWN_LABELS = {"KITTI": ["bench", "stop_sign"], "Panor": ["amenity=bench", "traffic_sign=stop"]}
