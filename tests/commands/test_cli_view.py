@@ -144,7 +144,9 @@ def test_pictures_and_files_that_are_left_out_are_named(coco: Path, run: Run) ->
     first, second = err.splitlines()[:2]
     assert first == "semsig: left out: labels/README.txt, in no format of detections"
     assert second.startswith("semsig: left out: 1 picture: the size of the picture b.jpg is not ")
-    assert second.endswith("or --size WIDTHxHEIGHT (b.jpg is not in labels; the nearest is 'a.jpg').")
+    assert second.endswith(
+        "or --size WIDTHxHEIGHT (b.jpg is not in labels; the nearest is 'a.jpg')."
+    )
     report = json.loads(run("view labels --fov 90 --out v.jsonl --json")[1])
     assert report["unknown_files"] == ["labels/README.txt"]
     assert list(report["left_out"]["pictures"]) == ["b.jpg"]
