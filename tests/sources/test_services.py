@@ -200,29 +200,29 @@ def test_arcgis_server_without_paging_sends_one_page(server: Server, fetched: Fe
 
 
 @pytest.mark.parametrize(
-    ("geometry", "text"),
+    ("geometry", "texts"),
     [
-        ({"x": 1, "y": 2, "z": 3}, "POINT (1 2)"),
-        ({"x": "NaN", "y": None}, None),
-        ({"points": [[1, 2], [3, 4]]}, "MULTIPOINT (1 2, 3 4)"),
-        ({"paths": [[[0, 0], [1, 1, 5]]]}, "MULTILINESTRING ((0 0, 1 1))"),
+        ({"x": 1, "y": 2, "z": 3}, ["POINT (1 2)"]),
+        ({"x": "NaN", "y": None}, [None]),
+        ({"points": [[1, 2], [3, 4]]}, ["POINT (1 2)", "POINT (3 4)"]),
+        ({"paths": [[[0, 0], [1, 1, 5]]]}, ["MULTILINESTRING ((0 0, 1 1))"]),
         (
             {"rings": [[[0, 0], [0, 4], [4, 4], [0, 0]], [[1, 2], [1, 3], [2, 3], [1, 2]]]},
-            "POLYGON ((0 0, 0 4, 4 4, 0 0), (1 2, 2 3, 1 3, 1 2))",
+            ["POLYGON ((0 0, 0 4, 4 4, 0 0), (1 2, 2 3, 1 3, 1 2))"],
         ),
-        ({"rings": []}, None),
+        ({"rings": []}, [None]),
     ],
 )
 def test_esri_geometries_are_read(
-    read_as: Callable[..., RawLayer], geometry: dict[str, Any], text: str | None
+    read_as: Callable[..., RawLayer], geometry: dict[str, Any], texts: list[str | None]
 ) -> None:
     rows = [{"attributes": {"a": 1}, "geometry": geometry}]
     content = {"spatialReference": {"wkid": 102100, "latestWkid": 3857}, "features": rows}
     layer = read_as("a.json", content, replace(LAMPS, id_field=None))
     assert layer.table.crs == "EPSG:3857"
-    (shape,) = layer.table.geometry
-    assert (shape is None) == (text is None)
-    assert text is None or shape.equals(shapely.from_wkt(text))
+    for shape, text in zip(layer.table.geometry, texts, strict=True):
+        assert (shape is None) == (text is None)
+        assert text is None or shape.equals(shapely.from_wkt(text))
 
 
 def test_arcgis_errors_come_with_status_200(server: Server, fetched: Fetch) -> None:

@@ -26,6 +26,7 @@ from semsig_gis.sources.services.gml import (
     read_feature,
     stated_crs,
 )
+from semsig_gis.sources.services.json_records import find_records
 from semsig_gis.sources.vector.formats import require_text
 from semsig_gis.storage import parse_json
 
@@ -126,20 +127,16 @@ def _json(path: Path) -> ServiceTable:
         raise SourceError(f"{path} is not whole JSON ({error}); download it again.") from error
     if isinstance(content, dict) and isinstance(content.get("result"), dict):
         content = content["result"]  # CKAN wraps its answers
-    collection = isinstance(content, dict) and content.get("type") == "FeatureCollection"
-    items, system, has_geometry = content, None, False
+    items, system, has_geometry = find_records(content), None, False
     if isinstance(content, dict):
-        keys = ("features",) if collection else ("features", "results", "records")
-        lists = [item for item in content.values() if _is_records(item)]
-        items = next((content[key] for key in keys if key in content), lists[0] if lists else None)
         has_geometry = "features" in content
         system = _json_crs(content, path)
     records = [ServiceRecord.parse(item) for item in items] if isinstance(items, list) else [""]
     readable = [record for record in records if isinstance(record, ServiceRecord)]
     if records and not readable:
         raise SourceError(
-            f"{path} has no records; give an export of a portal, which is a list of them or has "
-            "one under features, results or records."
+            f"{path} has no records; give JSON with a list of them, such as "
+            '[{"id": 1, "lat": 45.76, "lon": 4.84}].'
         )
     page = content if isinstance(content, dict) else {}
     total = next((page[name] for name in TOTALS if name in page), None)
@@ -151,10 +148,6 @@ def _json(path: Path) -> ServiceTable:
         empty=not records,
         rest=max(total - len(records), 0) if isinstance(total, int) else 0,
     )
-
-
-def _is_records(item: object) -> bool:
-    return isinstance(item, list) and bool(item) and all(isinstance(row, dict) for row in item)
 
 
 def _json_crs(content: dict[str, Any], path: Path) -> CRS | None:
