@@ -23,11 +23,10 @@ def find_records(content: Any) -> list[Any] | None:  # noqa: ANN401 - any JSON
         return content
     if not isinstance(content, dict):
         return None
-    if content.get("type") == "FeatureCollection":
-        return content.get("features")
-    named = next((content[key] for key in KEYS if isinstance(content.get(key), list)), None)
-    if named is not None:
-        return named
+    for key in KEYS:
+        named = content.get(key)
+        if isinstance(named, list):
+            return named
     found = max(_candidates(content, DEEPEST), key=len, default=None)
     if found is not None and "head" in content:
         return [
@@ -60,8 +59,8 @@ def _candidates(content: dict[str, Any], depth: int) -> Iterator[list[Any]]:
     if len(mappings) == len(values) >= LEAST_RECORDS and len(fields) == 1 and all(fields):
         yield [{"key": key, **value} for key, value in content.items()]
         return
-    for value in mappings if depth else ():
-        yield from _candidates(value, depth - 1)
+    for mapping in mappings if depth else ():
+        yield from _candidates(mapping, depth - 1)
 
 
 def _column_names(content: dict[str, Any]) -> list[str]:
