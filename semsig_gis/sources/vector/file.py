@@ -85,7 +85,7 @@ def read_layer(
     Parameters
     ----------
     path : str or Path
-        A shapefile, GeoJSON, GeoPackage, FlatGeobuf or CSV file, or an archive of such.
+        A vector file or table with a suffix of `DRIVERS`, or an archive of such.
     spec : LayerSpec
         Description of the layer, its rows and their class.
     filters : bool, default True
