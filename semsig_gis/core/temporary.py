@@ -216,19 +216,20 @@ def _locked_in_time(lock: int, path: Path, target: Path) -> bool:
         except OSError:
             return False
         time.sleep(LOOK_S)
-    warnings.warn(f"waiting for {_owner(path)}, which is writing {target}", stacklevel=2)
+    warnings.warn(f"{_owner(path)} {target}; waiting for it", stacklevel=2)
     return locked(lock, wait=True)
 
 
 def _owner(path: Path) -> str:
-    """Return a description of the process that has locked the file of `_lock_folder`."""
+    """Return who has locked the file of `_lock_folder`, as the start of a sentence."""
     try:
         number, since = map(int, path.read_bytes().split())
     except (OSError, ValueError):  # Windows lets nobody read a locked file
-        return "another program"
+        return "another program is writing"
     import psutil  # noqa: PLC0415 - 16 ms, and most commands do not wait
 
     with contextlib.suppress(psutil.Error):
         if psutil.Process(number).status() == psutil.STATUS_STOPPED:
-            return f"process {number}, which is stopped (kill -CONT {number} continues it)"
-    return f"process {number}, at work since {time.strftime('%H:%M:%S', time.localtime(since))}"
+            return f"process {number} is stopped (kill -CONT {number} continues it) while writing"
+    clock = time.strftime("%H:%M:%S", time.localtime(since))
+    return f"process {number} has since {clock} been writing"

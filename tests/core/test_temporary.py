@@ -105,7 +105,7 @@ def test_a_place_is_locked_for_one_writer_and_others_name_it(
     with place_locked(tmp_path / "another"):
         remove_abandoned(tmp_path)  # not a folder of a process at work
     threading.Timer(0.3, ended.set).start()
-    owner = rf"process {os.getpid()}, at work since .* {place}$"
+    owner = rf"process {os.getpid()} has since .* been writing {place}; waiting for it$"
     with pytest.warns(UserWarning, match=owner), place_locked(place) as is_locked:
         order.append(3 * is_locked)
     holder.join()
@@ -116,10 +116,10 @@ def test_a_place_is_locked_for_one_writer_and_others_name_it(
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="processes cannot be stopped")
 def test_a_stopped_owner_and_an_unknown_one_are_described(tmp_path: Path) -> None:
     file = tmp_path / "owner"
-    assert temporary._owner(file) == "another program"
+    assert temporary._owner(file) == "another program is writing"
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
         file.write_text(f"{process.pid} 0")
-        assert f"process {process.pid}, at work since" in temporary._owner(file)
+        assert f"process {process.pid} has since" in temporary._owner(file)
         process.send_signal(signal.SIGSTOP)
         try:
             for _ in range(100):
