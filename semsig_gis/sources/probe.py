@@ -38,7 +38,7 @@ ROOT = re.compile(rb"<(osm\w*)[\s>]")
 ELEMENT = re.compile(
     rb'"(?:elements"\s*:\s*\[|type"\s*:\s*"(?:node|way|relation)"|nodes"\s*:\s*\[\s*\{[^}]*"lat")'
 )
-# Keys of other sources, all of which are there.
+# Keys of other sources; a file has all of them.
 KEYS: dict[SourceFormat, tuple[re.Pattern[bytes], ...]] = {
     "gbfs": tuple(map(re.compile, (rb'"data"\s*:', rb'"stations"\s*:\s*\[', rb'"station_id"'))),
     "mapillary": tuple(

@@ -90,6 +90,6 @@ def test_stops_without_trips_are_bus_stops(tmp_path: Path, *, types: bool) -> No
     path = tmp_path / "stops.txt"
     path.write_text(stops(types=types), encoding="utf-8")
     ids = "0146" if types else "0123456"
-    found = kinds(path)
-    assert {stop for stop, kind in found.items() if kind == "bus_stop"} == set(ids)
-    assert len(found) == len(ids) + types
+    classes = kinds(path)
+    assert {stop for stop, kind in classes.items() if kind == "bus_stop"} == set(ids)
+    assert len(classes) == len(ids) + types

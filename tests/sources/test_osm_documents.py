@@ -1,4 +1,4 @@
-"""Forms of OpenStreetMap's elements that servers, editors and programs write beside extracts."""
+"""Forms of OpenStreetMap's elements that servers, editors and programs write, apart from extracts."""
 
 from __future__ import annotations
 
@@ -213,11 +213,11 @@ def test_table_of_a_server_is_read(tmp_path: Path, mark: str, *, kinds: bool) ->
     }
 
 
-def test_editor_file_is_read_beside_an_extract(tmp_path: Path) -> None:
+def test_editor_file_is_read_with_an_extract(tmp_path: Path) -> None:
     extract, edited = tmp_path / "town.osm", tmp_path / "edited.osm"
     extract.write_text(f"<osm version='0.6'>{NODE}{node(2, 2.001, 48, BENCH)}</osm>")
     new = node(-1, 2.002, 48, BENCH, action="modify")
-    gone = relation(9, {5: "outer"}, BENCH).replace("<relation", "<relation action='delete'")
-    edited.write_text(f"<osm version='0.6'>{NODE}{new}{gone}</osm>")
+    deleted = relation(9, {5: "outer"}, BENCH).replace("<relation", "<relation action='delete'")
+    edited.write_text(f"<osm version='0.6'>{NODE}{new}{deleted}</osm>")
     objects = load([extract, edited], collapse=False).objects
     assert sorted(objects.table["source_id"]) == ["node/-1", "node/1", "node/2"]

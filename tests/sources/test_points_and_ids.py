@@ -169,5 +169,7 @@ def test_placeholder_is_no_number_of_an_element(
     benches = load_catalog("openstreetmap").layer("benches")
     spec = replace(benches, elements=("node", "way", "relation"))
     (layer,) = frame_layers(table, [spec])
-    kept = [name for name in ids if not name.startswith("relation")]  # points are no multipolygons
-    assert layer.columns["source_id"].to_pylist() == kept
+    expected = [
+        name for name in ids if not name.startswith("relation")
+    ]  # points are no multipolygons
+    assert layer.columns["source_id"].to_pylist() == expected

@@ -146,8 +146,8 @@ def xml_form(path: Path) -> Literal["plain", "versions", "dialect"]:
                 if any(pattern.search(text) for pattern in DIALECTS):
                     return "dialect"
                 if form == "plain":
-                    found = (pattern.findall(text) for pattern in NAMES)  # the usual one first
-                    names = [last, *next(filter(None, found), ())]
+                    matches = (pattern.findall(text) for pattern in NAMES)  # the usual one first
+                    names = [last, *next(filter(None, matches), ())]
                     last = names[-1]
                     if any(itertools.starmap(operator.eq, itertools.pairwise(names))):
                         form = "versions"

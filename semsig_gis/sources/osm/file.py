@@ -118,7 +118,7 @@ def read_layers(
     areas; identifiers are such as ``"node/123"``. Elements of another kind than the layer needs
     count as filtered, clipped and invalid ones as unreadable. An element in several extracts counts
     once, by its newest copy, also of the versions in a history, and not if it is deleted. XML that
-    pyosmium does not read is read by `documents`; beside other files, it gives layers of its own.
+    pyosmium does not read is read by `documents`, and gives layers of its own if there are other files.
     `crs` only causes a note.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)

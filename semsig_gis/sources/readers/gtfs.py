@@ -84,9 +84,9 @@ def read_layers(
 def _stops(path: Path) -> CsvFile:
     """Open the table of stops; SourceError if it is not one."""
     require_file(path, "an archive of a GTFS feed, or its stops.txt")
-    found = [item for item in members(path) if item.path.name.lower() == STOPS or not item.inner]
-    if found:
-        file = open_csv(found[0].open, str(found[0]))
+    tables = [item for item in members(path) if item.path.name.lower() == STOPS or not item.inner]
+    if tables:
+        file = open_csv(tables[0].open, str(tables[0]))
         if {"stop_lat", "stop_lon"} <= {name.strip() for name in file.layouts[file.separator]}:
             return file
     raise SourceError(
