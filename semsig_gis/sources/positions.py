@@ -457,7 +457,8 @@ def _guesses(
             continue
         places = _places(x, y)
         fit = replace(own, x=x.name, y=y.name, sure=False)
-        if (_in_degrees(places) and _distance(places) <= NEAR_TOWN_KM) or _grid_of(places):
+        distances = [town.distance_km for town in _towns(places) if _in_degrees(places)]
+        if (distances and statistics.median(distances) <= NEAR_TOWN_KM) or _grid_of(places):
             fits.append(_Candidate(fit, places, (0.25,), _in_degrees(places), (), fixed=True))
     if len(fits) == 1:
         yield fits[0]
@@ -511,12 +512,8 @@ def _spread(places: Sequence[XY | None]) -> list[XY]:
 
 
 def _towns(places: Sequence[XY | None]) -> list[Town]:
-    return [nearest_town(*place) for place in _spread(places) if _in_degrees([place])]
-
-
-def _distance(places: Sequence[XY | None]) -> float:
-    """Return the typical distance of the places to a town, in km."""
-    return statistics.median([town.distance_km for town in _towns(places)] or [math.inf])
+    inside = [place for place in places if place is not None and _in_degrees([place])]
+    return [nearest_town(*place) for place in _spread(inside)]
 
 
 def _oriented(best: _Candidate) -> PositionFields:
@@ -543,12 +540,11 @@ def _oriented(best: _Candidate) -> PositionFields:
 def _by_towns(best: _Candidate, turned: Sequence[XY | None]) -> PositionFields:
     """Return the fields of a candidate in degrees with the axes of which places are near towns."""
     found = best.fields
-    if not _spread(best.places):
+    towns = _towns(best.places), _towns(turned)
+    if not all(towns):
         return found
-    here, there = _distance(best.places), _distance(turned)
-    as_said, exchanged = (
-        min(_towns(some), key=lambda town: town.distance_km) for some in (best.places, turned)
-    )
+    here, there = (statistics.median(town.distance_km for town in some) for some in towns)
+    as_said, exchanged = (min(some, key=lambda town: town.distance_km) for some in towns)
     surely = here > NEAR_TOWN_KM >= there
     maybe = here > FAR_FROM_TOWN_KM and there <= IN_TOWN_KM
     if not best.fixed and (surely or (maybe and best.unclear)):

@@ -70,7 +70,7 @@ def test_values_without_a_position_are_errors(read_as: Read) -> None:
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({"geometry_field": "plase"}, ["'plase'", "geometry_field", "is 'place'"]),
+        ({"geometry_field": "plce"}, ["'plce'", "geometry_field", "is 'place'"]),
         ({"geometry_field": "place", "x_field": "a", "y_field": "b"}, ["x_field", "remove"]),
         ({"axis_order": "lat_lon", "geometry_field": None}, ["axis_order", "geometry_field"]),
     ],
