@@ -163,7 +163,8 @@ def _require_names(file: CsvFile) -> None:
     """Raise SourceError if values stand in place of the names of columns."""
     names = file.layouts[file.separator]
     values = [name for name in names if NO_NAME.fullmatch(name) or WELL_KNOWN.fullmatch(name)]
-    if len(values) >= 2 or any(not value.replace(".", "").isdecimal() for value in values):  # noqa: PLR2004 - a pair
+    # A single number may be the name of a column.
+    if len(values) >= 2 or any(re.search(r"[^-+.\d]", value) for value in values):  # noqa: PLR2004 - a pair
         places = ["lon", "lat", *(f"column{number}" for number in range(3, len(names) + 1))]
         example = file.separator.join(places[: len(names)])
         raise SourceError(
