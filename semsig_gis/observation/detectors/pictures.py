@@ -6,20 +6,23 @@ import math
 import re
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from semsig_gis.observation.detectors.camera import MOST_PIXELS
 from semsig_gis.observation.detectors.documents import INVALID
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from semsig_gis.observation.detectors.camera import Projection
 
 Corners = tuple[float, float, float, float]
 """Left, top, right and bottom."""
 NO_CORNERS: Corners = (math.nan, math.nan, math.nan, math.nan)
+
+_Shape = TypeVar("_Shape")
+_Corners = TypeVar("_Corners")
 
 FOLDERS = {"labels": "images", "label_2": "image_2", "ann": "img", "Annotations": "JPEGImages"}
 """Folders of pictures of data sets, by the folder of their labels."""
@@ -179,6 +182,14 @@ def bounds(points: Iterable[Iterable[Any]]) -> Corners:
     except INVALID:
         return NO_CORNERS
     return min(columns), min(rows), max(columns), max(rows)
+
+
+def corners_of(read: Callable[[_Shape], _Corners], shape: _Shape) -> _Corners | Corners:
+    """Return the corners that a function reads from a shape; NaN if it cannot be read."""
+    try:
+        return read(shape)
+    except INVALID:
+        return NO_CORNERS
 
 
 def upright(corners: Corners, turn: int, size: tuple[int, int]) -> Corners:

@@ -646,6 +646,29 @@ def test_every_format_gives_same_boxes(form: str, tmp_path: Path) -> None:
     assert picture.shot.size == (None if form.startswith(NO_SIZES) else (800, 400))
 
 
+@pytest.mark.parametrize(
+    ("form", "part", "bad"),
+    [
+        ("Darwin", '"x": 80, ', '"x": "n/a", '),
+        ("Darwin", '"w": 160, ', ""),
+        ("CVAT for images", 'xtl="80" ', 'xtl="n/a" '),
+        ("CVAT for images", 'xtl="80" ', ""),
+        ("VIA", '"x": 80, ', ""),
+        ("Supervisely", "[[80, 100], [240, 200]]", "null"),
+        ("BDD100K", '"x1": 80', '"x1": null'),
+        ("answers of Rekognition, Vision or Roboflow", '"x": 160, ', ""),
+    ],
+)
+def test_one_shape_that_cannot_be_read_is_one_fault(
+    form: str, part: str, bad: str, tmp_path: Path
+) -> None:
+    ((name, text),) = SAMPLES[form].items()
+    assert part in text
+    (tmp_path / name).write_text(text.replace(part, bad, 1))
+    (picture,), _ = read_pictures([tmp_path / name])
+    assert [bool(box.fault) for box in picture.boxes] == [True, False]
+
+
 def test_folder_with_all_formats_and_other_files_is_read(tmp_path: Path) -> None:
     forms = [form for form in SAMPLES if form != "COCO (results)"]
     for number, form in enumerate(forms):
@@ -960,8 +983,8 @@ def annotation(**values: object) -> str:
         ("a.json", json.dumps({"a": {"filename": "a", "regions": [{}]}}),
          "does not follow its format, VIA (it lacks 'shape_attributes')"),
         ("a.json", json.dumps({**SUPERVISELY, "size": {"width": 9}}), "lacks 'height'"),
-        ("a.json", json.dumps(SUPERVISELY).replace('"eJ', '"AA'), "a bitmap is not a PNG"),
-        ("a.json", json.dumps([{"name": "a", "labels": [{"box2d": {"x1": 1}}]}]), "lacks 'y1'"),
+        ("a.json", json.dumps(SUPERVISELY).replace('"eJ', '"AA'), "has a box or a score"),
+        ("a.json", json.dumps([{"name": "a", "labels": [{"box2d": {"x1": 1}}]}]), "'category'"),
         ("a.json", json.dumps({**ITEM, "id": 3}).replace("0.75", "sure"),
          "picture 3, annotation 2 has a box or a score that is not a number"),
         ("a.json", json.dumps({"properties": ITEM["properties"]}), "Panoramax (it lacks 'id')"),

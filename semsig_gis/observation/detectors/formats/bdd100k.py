@@ -10,6 +10,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
+    corners_of,
     size_of,
 )
 
@@ -55,7 +56,7 @@ def _picture(frame: dict[str, Any], size: dict[str, Any], source: str) -> Annota
     boxes, others = [], 0
     for number, label in enumerate(frame.get("labels") or frame.get("objects") or (), start=1):
         attributes = label.get("attributes") or {}
-        corners = None if attributes.get("crowd") else _corners(label)
+        corners = None if attributes.get("crowd") else corners_of(_corners, label)
         if corners is None:
             others += 1
             continue

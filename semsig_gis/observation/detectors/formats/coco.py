@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core import InputError
-from semsig_gis.observation.detectors.documents import INVALID
 from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
-    NO_CORNERS,
     AnnotatedPicture,
     Shot,
     bounds,
     box_of,
+    corners_of,
     faulty_box,
     size_of,
 )
@@ -91,10 +90,7 @@ def _pictures(
         if item.get("iscrowd"):  # several objects
             others[image] += 1
             continue
-        try:
-            corners = _corners(item)
-        except INVALID:
-            corners = NO_CORNERS
+        corners = corners_of(_corners, item)
         if corners is None:
             others[image] += 1
         else:

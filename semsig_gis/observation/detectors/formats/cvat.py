@@ -11,6 +11,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
+    corners_of,
     size_of,
     turned,
 )
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from xml.etree import ElementTree as ET
 
     from semsig_gis.observation.detectors.documents import Document
+    from semsig_gis.observation.detectors.pictures import Corners
 
 CORNERS = ("xtl", "ytl", "xbr", "ybr")
 MASK = ("left", "top", "width", "height")
@@ -45,20 +47,8 @@ def _picture(image: ET.Element, source: str) -> AnnotatedPicture:
     name = image.attrib["name"]
     boxes, others = [], 0
     for number, shape in enumerate(image, start=1):
-        if shape.tag == "box":
-            left, top, right, bottom = (float(shape.attrib[key]) for key in CORNERS)
-            corners = left, top, right, bottom
-            if angle := float(shape.get("rotation", 0.0)):
-                corners = turned(corners, angle, ((left + right) / 2, (top + bottom) / 2))
-        elif shape.tag == "polygon":
-            corners = bounds(point.split(",") for point in shape.attrib["points"].split(";"))
-        elif shape.tag == "mask":
-            left, top, width, height = (float(shape.attrib[key]) for key in MASK)
-            corners = left, top, left + width, top + height
-        elif shape.tag == "ellipse":
-            x, y, across, down = (float(shape.attrib[key]) for key in ELLIPSE)
-            corners = x - across, y - down, x + across, y + down
-        else:
+        corners = corners_of(_corners, shape)
+        if corners is None:
             others += shape.tag != "tag"
             continue
         attributes = {item.get("name"): item.text for item in shape.iter("attribute")}
@@ -72,3 +62,23 @@ def _picture(image: ET.Element, source: str) -> AnnotatedPicture:
         boxes.append(box)
     size = size_of(image.get("width"), image.get("height"))
     return AnnotatedPicture(name=name, boxes=tuple(boxes), others=others, shot=Shot(size=size))
+
+
+def _corners(shape: ET.Element) -> Corners | None:
+    """Return the corners of a shape; None for points, lines and tags."""
+    if shape.tag == "polygon":
+        return bounds(point.split(",") for point in shape.attrib["points"].split(";"))
+    if shape.tag == "box":
+        left, top, right, bottom = (float(shape.attrib[key]) for key in CORNERS)
+        angle = float(shape.get("rotation", 0.0))
+        corners = left, top, right, bottom
+        return (
+            turned(corners, angle, ((left + right) / 2, (top + bottom) / 2)) if angle else corners
+        )
+    if shape.tag == "mask":
+        left, top, width, height = (float(shape.attrib[key]) for key in MASK)
+        return left, top, left + width, top + height
+    if shape.tag == "ellipse":
+        x, y, across, down = (float(shape.attrib[key]) for key in ELLIPSE)
+        return x - across, y - down, x + across, y + down
+    return None

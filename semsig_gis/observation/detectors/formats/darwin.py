@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.observation.detectors.documents import INVALID
 from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
-    NO_CORNERS,
     AnnotatedPicture,
     Shot,
     bounds,
     box_of,
+    corners_of,
     size_of,
 )
 
@@ -37,10 +36,7 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
     item = document.content["item"]
     boxes, others = [], 0
     for number, shape in enumerate(document.content["annotations"], start=1):
-        try:
-            corners = _corners(shape)
-        except INVALID:
-            corners = NO_CORNERS
+        corners = corners_of(_corners, shape)
         if corners is None:
             others += 1
             continue

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.formats import detection_format
-from semsig_gis.observation.detectors.pictures import AnnotatedPicture, box_of
+from semsig_gis.observation.detectors.pictures import AnnotatedPicture, box_of, faulty_box
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,10 +31,13 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
             continue
         where = f"{document.file}, line {number}"
         if len(words) not in {VALUES, VALUES + 1}:
-            raise InputError(
-                f"{where} has {len(words)} values; a line of KITTI has 15, and a score if it is "
-                "of a detector."
+            boxes.append(
+                faulty_box(
+                    f"{where} has {len(words)} values; a line of KITTI has 15, and a score if it "
+                    "is of a detector"
+                )
             )
+            continue
         if words[0] == REGION:
             others += 1
             continue

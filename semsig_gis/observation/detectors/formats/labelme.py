@@ -11,6 +11,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
+    corners_of,
     size_of,
 )
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from semsig_gis.observation.detectors.documents import Document
+    from semsig_gis.observation.detectors.pictures import Corners
 
 OUTLINES = frozenset({"polygon", "rectangle", "rotation", "mask", "circle"})
 
@@ -38,12 +40,9 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
         if kind not in OUTLINES:
             others += 1
             continue
-        if kind == "circle":  # its centre, and a point on it
-            (x, y), edge = points
-            radius = math.dist((x, y), edge)
-            points = [[x - radius, y - radius], [x + radius, y + radius]]
+        corners = bounds(points) if kind != "circle" else corners_of(_circle, points)
         where = f"{document.file}, shape {number}"
-        boxes.append(box_of(shape["label"], bounds(points), where, score=shape.get("score")))
+        boxes.append(box_of(shape["label"], corners, where, score=shape.get("score")))
     return [
         AnnotatedPicture(
             name=str(content["imagePath"] or document.file.stem),
@@ -52,3 +51,10 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
             shot=Shot(size=size_of(content.get("imageWidth"), content.get("imageHeight"))),
         )
     ]
+
+
+def _circle(points: list[list[float]]) -> Corners:
+    """Return the corners of a circle from its centre and a point on it."""
+    (x, y), edge = points
+    radius = math.dist((x, y), edge)
+    return x - radius, y - radius, x + radius, y + radius

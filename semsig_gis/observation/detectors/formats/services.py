@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 from semsig_gis.observation.detectors.documents import INVALID
 from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
-    NO_CORNERS,
     AnnotatedPicture,
     Shot,
     bounds,
     box_of,
+    corners_of,
     size_of,
 )
 
@@ -79,10 +79,7 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
     reader = next(_readers(content))
     boxes = []
     for number, (label, item, score) in enumerate(reader(content), start=1):
-        try:
-            corners = _corners(item)
-        except INVALID:
-            corners = NO_CORNERS
+        corners = corners_of(_corners, item)
         where = f"{document.file}, object {number}"
         boxes.append(box_of(label, corners, where, score=score))
     image = content.get("image") or {}

@@ -13,6 +13,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
+    corners_of,
     size_of,
 )
 
@@ -38,7 +39,7 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
     content = document.content
     boxes, others = [], 0
     for number, item in enumerate(content["objects"], start=1):
-        corners = _corners(item)
+        corners = corners_of(_corners, item)
         if corners is None:
             others += 1
             continue

@@ -5,7 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.observation.detectors.formats import detection_format
-from semsig_gis.observation.detectors.pictures import AnnotatedPicture, bounds, box_of
+from semsig_gis.observation.detectors.pictures import (
+    AnnotatedPicture,
+    bounds,
+    box_of,
+    corners_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,7 +46,7 @@ def _picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
     for number, region in enumerate(
         regions.values() if isinstance(regions, dict) else regions, start=1
     ):
-        corners = _corners(region["shape_attributes"])
+        corners = corners_of(_corners, region["shape_attributes"])
         if corners is None:
             others += 1
             continue

@@ -36,6 +36,7 @@ BOX_VALUES = 4
 DOTA_WORDS = 10  # eight numbers, a name and a mark
 NUMBER = re.compile(r"-?\d*\.?\d+(?:[eE][-+]?\d+)?")
 LEAST_WORDS = 4  # a line with fewer is of another kind of text
+LEAST_NUMBERS = 3
 
 
 def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
@@ -47,7 +48,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
         len(words) >= LEAST_WORDS
         and not words[0].endswith(":")
         and "." not in words[0].removesuffix(".0")
-        and NUMBER.fullmatch(words[1]) is not None
+        and sum(NUMBER.fullmatch(word) is not None for word in words[1:5]) >= LEAST_NUMBERS
         and NUMBER.fullmatch(words[-1]) is not None
         and (len(words) != DOTA_WORDS or NUMBER.fullmatch(words[-2]) is not None)
     )
