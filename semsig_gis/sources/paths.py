@@ -20,8 +20,8 @@ FILE_SUFFIXES = frozenset(
      ".mif", ".ndjson", ".o5m", ".ods", ".osh", ".spatialite", ".sqlite", ".sqlite3", ".tab",
      ".topojson", ".tsv"}
 )  # fmt: skip
-# A shapefile consists of several files, and each may be replaced.
-SHAPEFILE_PARTS = (".shp", ".shx", ".dbf", ".prj", ".cpg")
+# Formats of several files with the same name; each may be replaced.
+OF_PARTS = frozenset({".mif", ".shp", ".tab"})
 
 
 def is_geodatabase(path: Path) -> bool:
@@ -38,8 +38,9 @@ def file_stamp(path: Path) -> tuple[tuple[int, int, int], ...]:
     """Return what changes with a file, or with a file in a geodatabase; empty if it is absent."""
     if is_geodatabase(path):
         parts = sorted(path.iterdir())
-    elif path.suffix.lower() == ".shp":
-        parts = [path.with_suffix(suffix) for suffix in SHAPEFILE_PARTS]
+    elif path.suffix.lower() in OF_PARTS and path.is_file():
+        stem = path.stem.casefold()
+        parts = sorted(part for part in path.parent.iterdir() if part.stem.casefold() == stem)
     else:
         parts = [path]
     states = (part.stat() for part in parts if part.is_file())

@@ -142,15 +142,17 @@ TEXTS = {
 }
 
 
-@pytest.mark.parametrize("language_driver", [0x00, 0x57])
+@pytest.mark.parametrize(("page", "language_driver"), [(None, 0x00), ("unknown", 0x57)])
 @pytest.mark.parametrize("encoding", TEXTS)
 def test_unstated_encoding_of_a_shapefile_is_found(
-    tmp_path: Path, encoding: str, language_driver: int
+    tmp_path: Path, encoding: str, language_driver: int, page: str | None
 ) -> None:
     field, *kinds = TEXTS[encoding]
     path = tmp_path / "things.shp"
     frame(3, kind=["x" * 20] * 3).to_file(path, encoding="ISO-8859-1")
     path.with_suffix(".cpg").unlink()
+    if page is not None:
+        path.with_suffix(".CPG").write_text(page)
     table = path.with_suffix(".dbf")
     content = bytearray(table.read_bytes())
     content[29] = language_driver

@@ -6,7 +6,7 @@ import itertools
 import struct
 from typing import TYPE_CHECKING
 
-from semsig_gis.sources.encodings import Guess, guess_encoding, is_utf8
+from semsig_gis.sources.encodings import Guess, guess_encoding, is_utf8, parse_encoding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,8 +21,8 @@ MOST_ROWS = 200_000
 
 def guess_of(member: Member) -> Guess | None:
     """Return the likely encoding of a shapefile that is not ASCII; None if it states one."""
-    table = member.sibling(".dbf")
-    if table is None or member.sibling(".cpg") is not None:
+    table, page = member.sibling(".dbf"), member.sibling(".cpg")
+    if table is None or (page is not None and _names_encoding(page)):
         return None
     try:
         words = list(dict.fromkeys(_words(table)))
@@ -31,6 +31,16 @@ def guess_of(member: Member) -> Guess | None:
     if not words:
         return None
     return Guess("utf-8", sure=True) if is_utf8(words) else guess_encoding(words)
+
+
+def _names_encoding(page: Member) -> bool:
+    """Whether a file with the name of a code page has one, such as 1251 or GBK."""
+    try:
+        with page.open() as stream:
+            name = stream.read(100).decode("ascii").strip()
+        return any(map(str.isdigit, name)) or bool(parse_encoding(name))
+    except (OSError, ValueError):
+        return False
 
 
 def _words(table: Member) -> Iterator[bytes]:
