@@ -307,7 +307,9 @@ def _loaded(lines: Sequence[str], path: Path) -> tuple[RawLayer, ...]:
 def _draft(path: Path, sample: LayerSample, crs: str | None, *, several: bool) -> LayerDraft:
     """Guess what a layer of a file holds, one of `several`."""
     columns = columns_of(sample)
-    geometry = GEOMETRIES.get(sample.info.geometry.removeprefix("3D ").removeprefix("Multi"))
+    # As "3D Point" or "Point Z", with heights.
+    kind = re.sub(r"^(3D )?(Multi)?| Z?M?$", "", sample.info.geometry)
+    geometry = GEOMETRIES.get(kind)
     names = f"{path.stem} / {sample.info.name}"
     rows = len(sample.rows)
     guess = guess_class(sample.info.name, columns, geometry=geometry, rows=rows)
