@@ -1,4 +1,4 @@
-"""Forms of OpenStreetMap's elements that servers, editors and programs write, apart from extracts."""
+"""Forms of OpenStreetMap's elements that servers, editors and programs write."""
 
 from __future__ import annotations
 
@@ -220,4 +220,23 @@ def test_editor_file_is_read_with_an_extract(tmp_path: Path) -> None:
     deleted = relation(9, {5: "outer"}, BENCH).replace("<relation", "<relation action='delete'")
     edited.write_text(f"<osm version='0.6'>{NODE}{new}{deleted}</osm>")
     objects = load([extract, edited], collapse=False).objects
-    assert sorted(objects.table["source_id"]) == ["node/-1", "node/1", "node/2"]
+    new, *others = sorted(objects.table["source_id"])
+    assert others == ["node/1", "node/2"]
+    assert new.startswith("node/-1")
+
+
+@pytest.mark.parametrize("edits", [("", ""), ("", "deleted"), ("deleted", "deleted")])
+def test_numbers_below_zero_are_those_of_a_file(tmp_path: Path, edits: tuple[str, str]) -> None:
+    paths = []
+    for number, edit in enumerate(edits):
+        corners = [node(-n - 2, 2 + number + n / 1000, 48) for n in range(2)]
+        new = [node(-1, 2.5 + number, 48, BENCH), *corners, way(-9, [-2, -3], BENCH)]
+        removed = [node(99, 0, 0, action="delete")] if edit else []
+        path = tmp_path / f"{number}.osm"
+        path.write_text(f"<osm version='0.6'>{''.join((*new, *removed))}</osm>")
+        paths.append(path)
+    layers = reader("osm_file")(paths, [BENCHES])
+    places = [place for layer in layers for place in middles(layer).values()]
+    assert sorted(places) == [(2.0005, 48), (2.5, 48), (3.0005, 48), (3.5, 48)]
+    names = [name for layer in layers for name in middles(layer)]
+    assert len({*names}) == 4

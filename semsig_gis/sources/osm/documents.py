@@ -25,6 +25,7 @@ from semsig_gis.sources.osm.elements import (
     TagIndex,
     add_element,
     element_layers,
+    number_in_files,
     relation_shape,
     way_shape,
 )
@@ -317,11 +318,13 @@ def read_layers(
     *,
     filters: bool = True,
     crs: str | None = None,
+    files_before: int = 0,
 ) -> tuple[RawLayer, ...]:
     """Read the layers of `specs` from a file of JSON or XML, or from the tiles of an area.
 
     The layers are the same as those of `sources.osm.file.read_layers`; an element in several tiles
     counts once. SourceError if a file has no elements or is incomplete by its own remark.
+    Elements with numbers below zero are those of a file; `files_before` are read elsewhere.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} tiles"
@@ -331,13 +334,14 @@ def read_layers(
     index = TagIndex(specs)
     known_elements: set[tuple[str, int]] = set()
     centre_counts: collections.Counter[str] = collections.Counter()
-    for file in paths:
+    for file_number, file in enumerate(paths, start=files_before):
         document = load_document(file, where=str(file))
         if document.failed:
             raise SourceError(f"{file} is incomplete ({document.remark}); ask for a smaller area.")
         positions = _ElementPositions(document)
         for element in document.elements:
-            name = kind, number = element["type"], element["id"]
+            kind, number = element["type"], number_in_files(element["id"], file_number)
+            name = kind, number
             # Elements without tags are only there for the positions of others.
             if "tags" in element and name not in known_elements:
                 known_elements.add(name)

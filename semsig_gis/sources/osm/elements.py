@@ -26,6 +26,15 @@ RING_NODES = 4  # of the smallest ring, a triangle: the first node is also the l
 KIND_BY_LETTER: dict[str, ElementKind] = {"n": "node", "w": "way", "r": "relation"}
 
 
+# Numbers below zero are those of a file: this is between the numbers of two files.
+FILE_STEP = 10**12
+
+
+def number_in_files(number: int, file: int) -> int:
+    """Return a number of an element that is unique among files, the first of which has number 0."""
+    return number if number >= 0 else number - file * FILE_STEP
+
+
 def way_shape(xy: NDArray[np.float64], role: Role) -> BaseGeometry:
     """Return the geometry of a way: an area if it is closed and not a street, else a line.
 

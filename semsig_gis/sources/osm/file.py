@@ -118,8 +118,8 @@ def read_layers(
     areas; identifiers are such as ``"node/123"``. Elements of another kind than the layer needs
     count as filtered, clipped and invalid ones as unreadable. An element in several extracts counts
     once, by its newest copy, also of the versions in a history, and not if it is deleted. XML that
-    pyosmium does not read is read by `documents`, and gives layers of its own if there are other files.
-    `crs` only causes a note.
+    pyosmium does not read is read by `documents`, and gives layers of its own if there are
+    other files. `crs` only causes a note.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     files = {path: _file(path) for path in paths}
@@ -128,7 +128,9 @@ def read_layers(
     if dialects:
         others = [path for path in files if path not in dialects]
         more = read_layers(others, specs, filters=filters, crs=crs) if others else ()
-        return more + documents.read_layers(dialects, specs, filters=filters, crs=crs)
+        return more + documents.read_layers(
+            dialects, specs, filters=filters, crs=crs, files_before=len(others)
+        )
     where = str(paths[0]) if len(files) == 1 else f"{len(files)} extracts"
     layers = element_layers(specs, filters=filters, where=where)
     if not layers:

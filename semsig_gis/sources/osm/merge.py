@@ -11,6 +11,7 @@ from osmium.filter import EntityFilter, KeyFilter
 from osmium.osm import NODE, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core import SourceError
+from semsig_gis.sources.osm.elements import number_in_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -51,7 +52,7 @@ def merge_extracts(
     for number, (path, file) in enumerate(files.items()):
         with read_errors(path):
             for element in _elements(file):
-                name = _name(element)
+                name = _name(element, number)
                 if name in closure:
                     rank = (element.version, _size(element), -number)
                     best[name] = max(rank, best.get(name, rank))
@@ -61,24 +62,28 @@ def merge_extracts(
             with read_errors(path):
                 for element in _elements(file):
                     rank = (element.version, _size(element), -number)
-                    if best.get(_name(element)) == rank:
-                        del best[_name(element)]  # write it once
+                    if best.get(_name(element, number)) == rank:
+                        del best[_name(element, number)]  # write it once
                         if not element.deleted:
-                            print(_line(element), file=stream)
+                            print(_line(element, number), file=stream)
     return osmium.io.File(str(merged), "opl")
 
 
-def _line(element: Node | Way | Relation) -> str:
-    """Return an element as a line of the OPL format."""
-    parts = [f"{element.type_str()}{element.id}", f"v{element.version}"]
+def _line(element: Node | Way | Relation, file: int) -> str:
+    """Return an element of a file as a line of the OPL format."""
+    kind, own = _name(element, file)
+    parts = [f"{kind}{own}", f"v{element.version}"]
     if element.tags:
         tags = (f"{_escape(tag.k)}={_escape(tag.v)}" for tag in element.tags)
         parts.append("T" + ",".join(tags))
     if isinstance(element, Way):
-        parts.append("N" + ",".join(f"n{node.ref}" for node in element.nodes))
+        parts.append(
+            "N" + ",".join(f"n{number_in_files(node.ref, file)}" for node in element.nodes)
+        )
     elif isinstance(element, Relation):
         members = (
-            f"{member.type}{member.ref}@{_escape(member.role)}" for member in element.members
+            f"{member.type}{number_in_files(member.ref, file)}@{_escape(member.role)}"
+            for member in element.members
         )
         parts.append("M" + ",".join(members))
     elif element.location.valid():
@@ -94,17 +99,17 @@ def _escape(text: str) -> str:
 def _closure(files: Mapping[Path, osmium.io.File], index: TagIndex) -> set[ElementId]:
     """Return the elements with tags of a layer in any file, their ways and their nodes."""
     closure: set[ElementId] = set()
-    for path, file in files.items():
+    for number, (path, file) in enumerate(files.items()):
         with read_errors(path):
             for element in _elements(file, KeyFilter(*index.keys)):
                 if index.layers({tag.k: tag.v for tag in element.tags}):
-                    closure.add(_name(element))
-                    closure.update(_parts(element))
-    for path, file in files.items():
+                    closure.add(_name(element, number))
+                    closure.update(_parts(element, number))
+    for number, (path, file) in enumerate(files.items()):
         with read_errors(path):
             for way in _elements(file, EntityFilter(WAY)):
-                if _name(way) in closure:
-                    closure.update(_parts(way))
+                if _name(way, number) in closure:
+                    closure.update(_parts(way, number))
     return closure
 
 
@@ -119,19 +124,19 @@ def _elements(
             yield element
 
 
-def _name(element: Node | Way | Relation) -> ElementId:
-    return element.type_str(), element.id
+def _name(element: Node | Way | Relation, file: int) -> ElementId:
+    return element.type_str(), number_in_files(element.id, file)
 
 
-def _parts(element: Node | Way | Relation) -> Iterator[ElementId]:
+def _parts(element: Node | Way | Relation, file: int) -> Iterator[ElementId]:
     """Yield the nodes of a way, or the ways of a relation."""
     if isinstance(element, Way):
         for node in element.nodes:
-            yield "n", node.ref
+            yield "n", number_in_files(node.ref, file)
     elif isinstance(element, Relation):
         for member in element.members:
             if member.type == "w":
-                yield "w", member.ref
+                yield "w", number_in_files(member.ref, file)
 
 
 def _size(element: Node | Way | Relation) -> int:
