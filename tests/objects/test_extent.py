@@ -193,9 +193,9 @@ def test_what_is_far_can_be_kept() -> None:
     settled, _, (note,) = settle_extent(layers, keep_far=True)
     assert [len(item) for item in settled] == [51, 40]
     assert "3 places far apart" in note
-    (alone,), _, _ = settle_extent(layers[:1])
-    assert (len(alone), alone.counts.misplaced) == (50, 1)
-    assert "--clip none" in alone.notes[-1]
+    (single,), _, _ = settle_extent(layers[:1])
+    assert (len(single), single.counts.misplaced) == (50, 1)
+    assert "--clip none" in single.notes[-1]
 
 
 def test_larger_distortion_can_be_allowed() -> None:
