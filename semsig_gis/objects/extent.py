@@ -227,11 +227,11 @@ def settle_extent(
     for located in () if keep_far else with_points:
         _refuse_isolated_layer(located, towns)
     metric = metric or _utm_zone(*towns.centre())
-    kept = towns.number if keep_far else towns.large
-    extents = [towns.bounds(town) for town in range(kept)]
-    places = places[towns.of(places) < kept]
+    number = towns.number if keep_far else towns.large
+    extents = [towns.bounds(town) for town in range(number)]
+    places = places[towns.of(places) < number]
     notes = _require_plane(extents, places, metric, max_distortion)
-    return tuple(_without_strays(item, towns, kept) for item in located_layers), metric, notes
+    return tuple(_without_strays(item, towns, number) for item in located_layers), metric, notes
 
 
 def _located(layer: RawLayer) -> _LocatedLayer:
@@ -384,13 +384,13 @@ def _require_plane(
     return tuple(notes)
 
 
-def _without_strays(located: _LocatedLayer, towns: _Towns, kept: int) -> RawLayer:
-    """Return a layer without the objects that are in none of the first `kept` towns."""
+def _without_strays(located: _LocatedLayer, towns: _Towns, number: int) -> RawLayer:
+    """Return a layer without the objects that are in none of the first `number` towns."""
     layer = located.layer
     rows = np.flatnonzero(_valid(located.degrees))
     if layer.spec.role != "objects" or not len(rows):
         return layer
-    strays = rows[towns.of(located.degrees[rows]) >= kept]
+    strays = rows[towns.of(located.degrees[rows]) >= number]
     if not len(strays):
         return layer
     places = _distinct(located.degrees[strays])

@@ -26,7 +26,7 @@ MOST_TILES = 10_000
 QUARTER_TURN = 90.0  # degrees of latitude
 # The longest side of a box of a city; numbers in another order make one that is wide both ways.
 CITY_DEGREES, WIDE_DEGREES = 2.0, 10.0
-ALIKE = 4.0  # ratio of areas of boxes that may both be meant
+SIMILAR = 4.0  # ratio of areas of boxes that may both be meant
 EXCHANGED = "with latitude and longitude exchanged"
 
 
@@ -145,7 +145,7 @@ def other_orders(numbers: Sequence[float]) -> Iterator[tuple[str, Bounds]]:
     Each is west, south, east and north, with words for the order. The two corners may be any.
     """
     a, b, c, d = numbers
-    seen = {(a, b, c, d)}
+    boxes = {(a, b, c, d)}
     for words, xs, ys in (
         (EXCHANGED, (b, d), (a, c)),
         ("with its sides in order", (a, c), (b, d)),
@@ -155,8 +155,8 @@ def other_orders(numbers: Sequence[float]) -> Iterator[tuple[str, Bounds]]:
         box = (min(xs), min(ys), max(xs), max(ys))
         west, south, east, north = box
         on_earth = max(-west, east) <= HALF_TURN and max(-south, north) <= QUARTER_TURN
-        if on_earth and west < east and south < north and box not in seen:
-            seen.add(box)
+        if on_earth and west < east and south < north and box not in boxes:
+            boxes.add(box)
             yield words, box
 
 
@@ -172,7 +172,7 @@ def advice(orders: Iterable[tuple[str, Bounds]]) -> str:
     least = min((math.prod(sides_of(box)) for _, box in boxes), default=0.0)
     readings = []
     for words, (west, south, east, north) in boxes:
-        if (east - west) * (north - south) <= ALIKE * least:
+        if (east - west) * (north - south) <= SIMILAR * least:
             town = nearest_town((west + east) / 2, (south + north) / 2)
             box = box_text((west, south, east, north))
             readings.append((town.distance_km, f"{words} it is {box} ({town})"))

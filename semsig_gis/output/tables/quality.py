@@ -238,8 +238,8 @@ def lost_sentence(report: QualityReport) -> str:
         words: sum(getattr(item.counts, name) for item in report.sources)
         for name, words in LOST.items()
     }
-    lost = [f"{number:,} {words}" for words, number in totals.items() if number]
-    return f"Rows left out: {', '.join(lost)}; --tables lists them by layer." if lost else ""
+    counts = [f"{number:,} {words}" for words, number in totals.items() if number]
+    return f"Rows left out: {', '.join(counts)}; --tables lists them by layer." if counts else ""
 
 
 def _origins(report: QualityReport) -> str:
