@@ -7,7 +7,8 @@ change the result.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections import Counter
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -219,8 +220,14 @@ def settle_extent(
                 "catalogue, in x_field and y_field or in geometry_field."
             )
         if metric is None:
+            totals = Counter[str]()
+            for item in layers:
+                totals.update(asdict(item.counts))
+            rows = totals.pop("read")
+            reasons = "".join(f", {count:,} {name}" for name, count in totals.items() if count)
             raise EmptyResultError(
-                "no layer has a feature with a position; look at the filters and the area."
+                f"no layer has a feature with a position (rows: {rows:,} read{reasons}); look at "
+                "the filters and the area."
             )
         return tuple(layers), metric, ()
     towns = _Towns(places)
