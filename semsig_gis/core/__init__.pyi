@@ -19,6 +19,7 @@ from .errors import InputError as InputError
 from .errors import SemsigError as SemsigError
 from .errors import SourceError as SourceError
 from .errors import UnknownNameError as UnknownNameError
+from .errors import brief as brief
 from .errors import extra as extra
 from .errors import listed as listed
 from .errors import nearest_name as nearest_name

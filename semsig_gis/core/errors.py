@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
 NAMES_LISTED = 40
+MOST_CHARACTERS = 200
 
 
 class SemsigError(Exception):
@@ -58,6 +59,18 @@ class EmptyResultError(SemsigError, ValueError):
 
 class DatabaseError(SemsigError, RuntimeError):
     """A file written by the package is damaged or does not fit the request."""
+
+
+def brief(error: Exception) -> str:
+    """Return the first sentence of the message of an error, shortened, for a part of a sentence.
+
+    Examples
+    --------
+    >>> brief(ValueError("It has no rows. Give others."))
+    'It has no rows'
+    """
+    text = " ".join(str(error).split()).partition(". ")[0].rstrip(".")
+    return text if len(text) <= MOST_CHARACTERS else f"{text[:MOST_CHARACTERS]}…"
 
 
 def nearest_name(name: str, names: Iterable[str]) -> str:

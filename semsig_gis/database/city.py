@@ -17,6 +17,7 @@ from semsig_gis.core import (
     DatabaseError,
     Displayed,
     InputError,
+    brief,
     export_with,
     map_with,
     place_locked,
@@ -273,7 +274,7 @@ class City(Displayed):
             names, facts = ["cell_id", *map(str, entries[0]["columns"])], dict(entries[0]["facts"])
         except (KeyError, TypeError, ValueError) as error:
             raise DatabaseError(
-                f"the {name} in {self.path} is damaged ({error}); compute it again."
+                f"the {name} in {self.path} is damaged ({brief(error)}); compute it again."
             ) from error
         tables = [read_geoparquet(file, kind=KIND, columns=names)[0] for file in files]
         return pa.concat_tables(tables).sort_by("cell_id"), facts

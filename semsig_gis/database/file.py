@@ -22,6 +22,7 @@ from semsig_gis.core import (
     SemsigError,
     SignatureSpec,
     Taxonomy,
+    brief,
     remove_abandoned,
     split_ids,
 )
@@ -225,7 +226,9 @@ def database_of(
             extent_units=extent_units,
         )
     except (KeyError, TypeError, ValueError, SemsigError) as error:
-        raise DatabaseError(f"{path} is damaged ({error}); build the database again.") from error
+        raise DatabaseError(
+            f"{path} is damaged ({brief(error)}); build the database again."
+        ) from error
     # Properties of every signature; a checksum would not detect columns that were swapped.
     same_cell = np.ones(len(symbols), bool)
     same_cell[offsets[:-1]] = False

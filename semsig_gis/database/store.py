@@ -29,6 +29,7 @@ from semsig_gis.core import (
     Displayed,
     InputError,
     ObjectIndex,
+    brief,
     crs_label,
     place_locked,
 )
@@ -512,7 +513,9 @@ def _read_shapes(path: Path) -> gpd.GeoDataFrame:
     try:
         return gpd.read_parquet(path)
     except (*UNREADABLE, shapely.errors.ShapelyError) as error:
-        raise DatabaseError(f"{path} is damaged ({error}); build the database again.") from error
+        raise DatabaseError(
+            f"{path} is damaged ({brief(error)}); build the database again."
+        ) from error
 
 
 def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:

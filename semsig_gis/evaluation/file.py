@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import shapely
 
-from semsig_gis.core import DatabaseError, InputError
+from semsig_gis.core import DatabaseError, InputError, brief
 from semsig_gis.evaluation.queries.distortion_text import chain_text, parse_chain
 from semsig_gis.evaluation.queries.distortions import SimulatedDetector
 from semsig_gis.evaluation.queries.draw import QuerySpec
@@ -162,7 +162,7 @@ def open_evaluation(folder: str | Path) -> Evaluation:
             machine=timing.get("machine", {}),
         )
     except (*UNREADABLE, shapely.errors.ShapelyError) as error:
-        raise DatabaseError(f"{file} is damaged ({error}); evaluate again.") from error
+        raise DatabaseError(f"{file} is damaged ({brief(error)}); evaluate again.") from error
 
 
 def _of_run(path: Path, run: str) -> dict[str, Any]:

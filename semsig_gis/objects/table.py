@@ -32,6 +32,7 @@ from semsig_gis.core import (
     Displayed,
     Taxonomy,
     bounds_text,
+    brief,
     crs_label,
     map_with,
     plot_with,
@@ -494,7 +495,7 @@ def objects_of(
         xy = wkb_to_points(arrow[GEOMETRY])
     except (TypeError, ValueError, LookupError, pa.ArrowException) as error:
         raise DatabaseError(
-            f"{path} is damaged ({error}); load the street objects again."
+            f"{path} is damaged ({brief(error)}); load the street objects again."
         ) from error
     may_be_empty = box is not None
     if not ((len(arrow) or may_be_empty) and len(xy) == len(arrow) and np.isfinite(xy).all()):

@@ -14,6 +14,7 @@ from semsig_gis.core import (
     Displayed,
     InputError,
     SemsigError,
+    brief,
     map_with,
     percent,
     plot_with,
@@ -361,7 +362,7 @@ def identifiability_of(
         identifiability = _parsed(database, noise, table, facts) if belongs else None
     except (KeyError, TypeError, ValueError, SemsigError) as error:
         raise DatabaseError(
-            f"the identifiability in {path} is damaged ({error}); run semsig identify again."
+            f"the identifiability in {path} is damaged ({brief(error)}); run semsig identify again."
         ) from error
     if identifiability is None:
         raise DatabaseError(
