@@ -97,7 +97,8 @@ def test_evaluate_and_map(run_ok: RunOk) -> None:
     assert summary["settings"]["queries"] == 30
     assert summary["settings"]["method"] == "edit+edit:20%"
     assert summary.pop("timing")["seconds_per_query"] > 0
-    assert json.loads(text("eval/evaluation.json")) == summary
+    stored = json.loads(text("eval/evaluation.json"))
+    assert {name: value for name, value in stored.items() if name != "run"} == summary
     out = run_ok(line, "--report", "eval.html")
     assert f"Of 30 views, {summary['results']['p_error_within_m']['50']:.0%}".rstrip("%") in out
     assert "report: eval.html" in out
@@ -520,8 +521,8 @@ def test_unknown_class_and_empty_query_are_answered(
     run_ok: RunOk, method: str, view: str, words: str
 ) -> None:
     query = f"localize few.parquet {view} --method {method}"
-    (note,) = json.loads(run_ok(f"{query} --json"))["notes"]
-    assert words in note
+    notes = json.loads(run_ok(f"{query} --json"))["notes"]
+    (note,) = (note for note in notes if words in note)
     assert f"Note: {note}" in " ".join(run_ok(query).split())
 
 
