@@ -63,7 +63,7 @@ RUN = "semsig_objects"
 NEAR_M = 1000.0
 """Distance from the street objects of a city to its buildings and streets."""
 FAR_M = 10_000.0
-"""Distance of an area from all objects from which it is refused; none is seen from so far."""
+"""Distance from all objects at which an area is refused, because none is seen from there."""
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 KIND_OF: dict[str, GeometryKind] = {"buildings": "polygon", "streets": "line", "area": "polygon"}
 # Distance between points along the edges of a box, which are curves in the metric CRS: this is

@@ -88,7 +88,7 @@ LATITUDE, LONGITUDE = "lat", "lon"
 class Located(NamedTuple):
     """A position in a value; `srid` is the EPSG code that it states, or 0.
 
-    `pair` is whether it is two numbers, whose `order` may be certain from letters or names.
+    `pair` is whether it is two numbers; their `order` may be certain from letters or names.
     """
 
     position: Position

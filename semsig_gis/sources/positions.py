@@ -538,7 +538,7 @@ def _oriented(best: _Candidate) -> PositionFields:
 
 
 def _by_towns(best: _Candidate, turned: Sequence[XY | None]) -> PositionFields:
-    """Return the fields of a candidate in degrees with the axes of which places are near towns."""
+    """Return the fields of a candidate in degrees, in the axis order with places near towns."""
     found = best.fields
     towns = _towns(best.places), _towns(turned)
     if not all(towns):

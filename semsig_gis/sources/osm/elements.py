@@ -31,7 +31,7 @@ FILE_STEP = 10**12
 
 
 def number_in_files(number: int, file: int) -> int:
-    """Return a number of an element that is unique among files, the first of which has number 0."""
+    """Return a number of an element that is unique among files, which are counted from 0."""
     return number if number >= 0 else number - file * FILE_STEP
 
 
