@@ -224,8 +224,8 @@ class LoadOptions:
         from semsig_gis.output import lost_sentence, quality_sentence
 
         yield quality_sentence(report)
-        if lost := lost_sentence(report):
-            yield lost
+        if sentence := lost_sentence(report):
+            yield sentence
 
     def _tables(self, report: street_objects.QualityReport) -> Iterator[Table]:
         from semsig_gis.output import quality_tables

@@ -301,10 +301,10 @@ def read_area(
     system = parse_crs(crs)
     numbers: tuple[float, ...] = ()
     if isinstance(area, str | Path) and NUMBERS.fullmatch(str(area)):
-        given = parse_area(str(area))
-        numbers = given.numbers
+        own_area = parse_area(str(area))
+        numbers = own_area.numbers
         shapes = transformed(
-            np.array([shapely.segmentize(given.polygon, EDGE_DEGREES)]), WGS84, system
+            np.array([shapely.segmentize(own_area.polygon, EDGE_DEGREES)]), WGS84, system
         )
     else:
         shapes = _read(area, "area", crs).geometry.to_numpy()

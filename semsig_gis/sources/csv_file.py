@@ -143,13 +143,13 @@ def open_csv(open_: Callable[[], IO[bytes]], what: str, *, encoding: str | None 
     # Titles and comments may stand before the table, and blanks between its columns.
     plain = [_layout(lines, mark, first) for mark in marks]
     titled = [_layout(lines, mark, first, titles=True) for mark in marks]
-    found = [b if b.fits and not a.fits else a for a, b in zip(plain, titled, strict=True)]
+    tables = [b if b.fits and not a.fits else a for a, b in zip(plain, titled, strict=True)]
     blanks = _layout(lines, BLANK, first, titles=True)
-    most = max((len(item.names) for item in found if item.fits), default=0)
+    most = max((len(item.names) for item in tables if item.fits), default=0)
     if blanks.fits and len(blanks.names) > most:
-        found = [blanks]
+        tables = [blanks]
     # At the same number of columns, the table that begins first counts.
-    for item in sorted(found, key=lambda item: (not item.fits, -len(item.names), item[:2][::-1])):
+    for item in sorted(tables, key=lambda item: (not item.fits, -len(item.names), item[:2][::-1])):
         layouts[item.separator], starts[item.separator] = item.names, item.start
     if not any(name for names in layouts.values() for name in names):
         raise SourceError(

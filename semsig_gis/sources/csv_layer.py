@@ -86,16 +86,16 @@ def csv_table(
             return CsvTable(file, separator, PlaceReader(fields, what))
     for separator, names in file.layouts.items():
         readable = (row for row in file.rows(separator) if not isinstance(row, str))
-        found = find_positions(
+        place_fields = find_positions(
             names,
             [*itertools.islice(readable, SAMPLE_ROWS)],
             subject=Path(what).stem,
             english=separator == ",",
         )
-        if found is not None:
-            if spec is not None and not found.sure:
-                raise SourceError(f"{where} {uncertain_positions(found)}.")
-            return CsvTable(file, separator, PlaceReader(found, what))
+        if place_fields is not None:
+            if spec is not None and not place_fields.sure:
+                raise SourceError(f"{where} {uncertain_positions(place_fields)}.")
+            return CsvTable(file, separator, PlaceReader(place_fields, what))
     if spec is None:
         return CsvTable(file, file.separator)
     raise SourceError(f"{where} {no_positions(file.layouts[file.separator])}.")

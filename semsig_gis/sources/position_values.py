@@ -242,8 +242,8 @@ def _of_shape(shape: shapely.Geometry, srid: int = 0) -> Located:
 def _of_text(text: str, order: AxisOrder | None, *, o_is_east: bool) -> Located | None:
     if code := HEXADECIMAL.fullmatch(text):
         return _of_shape(shapely.from_wkb(code[1]))
-    if known := WELL_KNOWN.fullmatch(text):
-        return _of_shape(shapely.from_wkt(known[2]), int(known[1] or 0))
+    if match := WELL_KNOWN.fullmatch(text):
+        return _of_shape(shapely.from_wkt(match[2]), int(match[1] or 0))
     if uri := GEO_URI.fullmatch(text):
         if "crs=" in (uri[3] or "").lower().replace("crs=wgs84", ""):
             raise ValueError("a CRS of its own")

@@ -114,14 +114,14 @@ class PositionFields:
         """Return the position of a row, or None if it is blank; BadFeatureError if it has none."""
         if self.field is not None:
             try:
-                found = locate(values.get(self.field), self.order, o_is_east=self.o_is_east)
+                place = locate(values.get(self.field), self.order, o_is_east=self.o_is_east)
             except BadFeatureError as error:
                 raise BadFeatureError(f"{self.field} {error}") from error
-            if found is None or found.pair or not self.turned:
-                return found
-            if isinstance(found.position, tuple):
-                return found._replace(position=found.position[::-1])
-            return found._replace(position=shapely.transform(found.position, np.fliplr))
+            if place is None or place.pair or not self.turned:
+                return place
+            if isinstance(place.position, tuple):
+                return place._replace(position=place.position[::-1])
+            return place._replace(position=shapely.transform(place.position, np.fliplr))
         both = [(str(name), values.get(str(name))) for name in (self.x, self.y)]
         if all(_is_blank(value) for _, value in both):
             return None
@@ -206,11 +206,11 @@ def no_positions(fields: Sequence[str]) -> str:
     )
 
 
-def uncertain_positions(found: PositionFields) -> str:
+def uncertain_positions(choice: PositionFields) -> str:
     """Return what to write in a catalogue for fields that only by their values are positions."""
     return (
-        f"names no fields of positions, and {found.x} and {found.y} may be; write x_field = "
-        f'"{found.x}" and y_field = "{found.y}" in the catalogue if they are'
+        f"names no fields of positions, and {choice.x} and {choice.y} may be; write x_field = "
+        f'"{choice.x}" and y_field = "{choice.y}" in the catalogue if they are'
     )
 
 
@@ -263,8 +263,8 @@ def find_positions(
     if not candidates:
         return None
     best, *others = candidates
-    found = _oriented(best)
-    return replace(found, questions=(*found.questions, *_other_places(best, others)))
+    choice = _oriented(best)
+    return replace(choice, questions=(*choice.questions, *_other_places(best, others)))
 
 
 def _whole_fields(
@@ -283,14 +283,14 @@ def _whole_fields(
             continue
         if not _is_position(name, filled):
             continue
-        found = [None if _is_blank(value) else read(value) for value in values]
-        hits = [item for item in found if item is not None]
+        parsed_values = [None if _is_blank(value) else read(value) for value in values]
+        hits = [item for item in parsed_values if item is not None]
         if 2 * len(hits) < len(filled):
             continue
         free = [item for item in hits if item.pair and item.order is None]
         fixed = 2 * sum(item.order is not None for item in hits) > len(hits)
         geometries = 2 * sum(not item.pair for item in hits) >= len(hits)
-        places = tuple(item and _xy(item) for item in found)
+        places = tuple(item and _xy(item) for item in parsed_values)
         degrees = _in_degrees(places)
         order = None if fixed or geometries else order
         bare = not (fixed or geometries)
@@ -324,9 +324,9 @@ def _located(value: object, *, order: AxisOrder | None, o_is_east: bool) -> Loca
 
 def _is_position(name: str, values: Sequence[object]) -> bool:
     """Whether values that can be read as pairs are positions, not sizes, ranges or dates."""
-    named = bool({*tokens_of(name)} & hints("whole")) or role_of(name) is not None
-    named = named or order_by_name(name) is not None
-    precise = FEW_DECIMALS if named else MANY_DECIMALS
+    has_name = bool({*tokens_of(name)} & hints("whole")) or role_of(name) is not None
+    has_name = has_name or order_by_name(name) is not None
+    precise = FEW_DECIMALS if has_name else MANY_DECIMALS
     sure = 0
     for value in values:
         located = _located(value, order=None, o_is_east=False)
@@ -399,7 +399,7 @@ def _pairs(
     }
     own = PositionFields(english=english, o_is_east=o_is_east)
     roles = {name: role for name in fields if (role := role_of(name)) is not None}
-    named = False
+    has_name = False
     for (x, x_role), (y, y_role) in itertools.product(roles.items(), repeat=2):
         if (x_role.axis, y_role.axis) != ("x", "y") or x == y:
             continue
@@ -417,7 +417,7 @@ def _pairs(
         readable = 1.0 if any(places) else 0.5 if blank else 0.0
         if not readable and strength == 1:
             continue
-        named = named or readable == 1.0
+        has_name = has_name or readable == 1.0
         rank = (
             readable,
             not words & hints("observer"),
@@ -441,7 +441,7 @@ def _pairs(
             fixed=all(letters),
             precise=all(item and max(item.fine, item.marked) >= 0.5 for item in both),  # noqa: PLR2004 - half
         )
-    if not named:
+    if not has_name:
         yield from _guesses(columns, roles, own)
 
 
@@ -452,8 +452,8 @@ def _guesses(
     likely = [item for item in columns.values() if _precise(item)]
     fits = []
     for x, y in itertools.permutations(likely, 2):
-        named = [role.axis if (role := roles.get(item.name)) else "" for item in (x, y)]
-        if named[0] == "y" or named[1] == "x" or x.axis == LATITUDE or y.axis == LONGITUDE:
+        axes = [role.axis if (role := roles.get(item.name)) else "" for item in (x, y)]
+        if axes[0] == "y" or axes[1] == "x" or x.axis == LATITUDE or y.axis == LONGITUDE:
             continue
         places = _places(x, y)
         fit = replace(own, x=x.name, y=y.name, sure=False)
@@ -518,31 +518,31 @@ def _towns(places: Sequence[XY | None]) -> list[Town]:
 
 def _oriented(best: _Candidate) -> PositionFields:
     """Return the fields of a candidate with x and y as the values say, and what to check."""
-    found, places = best.fields, best.places
+    choice, places = best.fields, best.places
     turned = tuple(place and place[::-1] for place in places)
     if not any(places) or _grid_of(places):
-        return _with_grid(found, places)
+        return _with_grid(choice, places)
     if _grid_of(turned) and not best.fixed:
-        return _with_grid(found.exchanged, turned)
+        return _with_grid(choice.exchanged, turned)
     fits = (_in_degrees(places), _in_degrees(turned))
     if fits == (False, True) and not best.fixed:
         if best.unclear:
-            return found.exchanged
+            return choice.exchanged
         if best.precise:
-            first, second = (found.field, "the other") if found.field else (found.y, found.x)
+            first, second = (choice.field, "the other") if choice.field else (choice.y, choice.x)
             text = f"{first} is out of the range of latitudes, so that {second} is taken for it"
-            return replace(found.exchanged, questions=(text,))
+            return replace(choice.exchanged, questions=(text,))
     if not (all(fits) and best.precise):
-        return _with_grid(found, places)
+        return _with_grid(choice, places)
     return _by_towns(best, turned)
 
 
 def _by_towns(best: _Candidate, turned: Sequence[XY | None]) -> PositionFields:
     """Return the fields of a candidate in degrees, in the axis order with places near towns."""
-    found = best.fields
+    choice = best.fields
     towns = _towns(best.places), _towns(turned)
     if not all(towns):
-        return found
+        return choice
     here, there = (statistics.median(town.distance_km for town in some) for some in towns)
     as_said, exchanged = (min(some, key=lambda town: town.distance_km) for some in towns)
     surely = here > NEAR_TOWN_KM >= there
@@ -552,11 +552,11 @@ def _by_towns(best: _Candidate, turned: Sequence[XY | None]) -> PositionFields:
             f"longitude and latitude look exchanged: as they are written, {as_said}; as read "
             f"here, {exchanged}"
         )
-        return replace(found.exchanged, questions=(question,))
+        return replace(choice.exchanged, questions=(question,))
     if surely or maybe or best.unclear:
         question = f"as read here, {as_said}; with longitude and latitude exchanged, {exchanged}"
-        return replace(found, questions=(question,))
-    return found
+        return replace(choice, questions=(question,))
+    return choice
 
 
 def _grid_of(places: Sequence[XY | None]) -> str | None:
@@ -570,17 +570,17 @@ def _grid_of(places: Sequence[XY | None]) -> str | None:
     return fits[0] if len(fits) == 1 else None
 
 
-def _with_grid(found: PositionFields, places: Sequence[XY | None]) -> PositionFields:
+def _with_grid(choice: PositionFields, places: Sequence[XY | None]) -> PositionFields:
     """Return the fields with the CRS that coordinates in a plane, or their names, suggest."""
     if _in_degrees(places) or not any(places):
-        return found
+        return choice
     crs = _grid_of(places)
     if crs is None:
-        named = (crs_in_name(name) for name in found.names)
-        crs = next(filter(None, named), None)
+        codes = (crs_in_name(name) for name in choice.names)
+        crs = next(filter(None, codes), None)
         if crs is not None and not fits_area(places, crs):
-            return found
-    return replace(found, crs=crs)
+            return choice
+    return replace(choice, crs=crs)
 
 
 def fits_area(places: Sequence[XY | None], crs: str) -> bool:
@@ -600,25 +600,25 @@ def _to_degrees(crs: str) -> Transformer:
     return Transformer.from_crs(parse_crs(crs), 4326, always_xy=True)
 
 
-def for_crs(found: PositionFields, rows: Sequence[Row], crs: str) -> PositionFields:
+def for_crs(choice: PositionFields, rows: Sequence[Row], crs: str) -> PositionFields:
     """Return the fields with x and y exchanged if only so they are in the area of a CRS.
 
     In several countries, x is the coordinate to the north.
     """
-    if found.x is None or not parse_crs(crs).is_projected:
-        return found
+    if choice.x is None or not parse_crs(crs).is_projected:
+        return choice
     places = []
     for row in rows[:SAMPLE_ROWS]:
         try:
-            located = found.locate(row)
+            located = choice.locate(row)
         except BadFeatureError:
             continue
         places.append(located and _xy(located))
     turned = [place and place[::-1] for place in places]
     if fits_area(places, crs) or not fits_area(turned, crs):
-        return found
-    question = f"only with {found.y} as the coordinate to the east is it in the area of {crs}"
-    return replace(found.exchanged, questions=(*found.questions, question))
+        return choice
+    question = f"only with {choice.y} as the coordinate to the east is it in the area of {crs}"
+    return replace(choice.exchanged, questions=(*choice.questions, question))
 
 
 def _other_places(best: _Candidate, others: Sequence[_Candidate]) -> Iterator[str]:

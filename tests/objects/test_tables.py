@@ -167,8 +167,8 @@ def farthest(objects: StreetObjects, places: Sequence[Pair]) -> float:
 def test_every_table_is_drafted_and_loaded_to_the_centimetre(tmp_path: Path) -> None:
     @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
     @given(tables())
-    def holds(drawn: tuple[bytes, list[Pair]]) -> None:
-        content, places = drawn
+    def holds(table: tuple[bytes, list[Pair]]) -> None:
+        content, places = table
         file = tmp_path / "street_lights.csv"
         file.write_bytes(content)
         objects = read(file, draft_catalog(file))

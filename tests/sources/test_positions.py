@@ -110,5 +110,5 @@ def test_fields_of_positions_are_found(
     rows: Sequence[dict[str, Any]], expected: tuple[str, ...]
 ) -> None:
     fields = list(dict.fromkeys(name for row in rows for name in row))
-    found = find_positions(fields, rows)
-    assert (found.names if found else ()) == expected
+    place_fields = find_positions(fields, rows)
+    assert (place_fields.names if place_fields else ()) == expected

@@ -193,9 +193,9 @@ def test_shapefile_without_encoding_is_utf8_or_else_latin(tmp_path: Path, encodi
     layer = read(path, where=(("kind", ("allée",)),))
     assert xy(layer) == [[1, 2]]
     assert counts(layer) == (2, 1, 0)
-    said = [note for note in layer.notes if "the encoding is not stated; read as cp1252" in note]
-    assert layer.notes == (() if encoding == "UTF-8" else tuple(said))
-    assert bool(said) == (encoding != "UTF-8")
+    notes = [note for note in layer.notes if "the encoding is not stated; read as cp1252" in note]
+    assert layer.notes == (() if encoding == "UTF-8" else tuple(notes))
+    assert bool(notes) == (encoding != "UTF-8")
 
 
 def test_field_names_of_a_shapefile_without_encoding_are_latin(tmp_path: Path) -> None:

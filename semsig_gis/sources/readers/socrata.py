@@ -100,8 +100,8 @@ def _coordinates(client: Client, fields: list[str]) -> tuple[str | None, str | N
     if layer.x_field and layer.y_field:
         x, y = (find_field(name, layer, fields) for name in (layer.x_field, layer.y_field))
         return x, y
-    found = find_positions(fields, ())
-    return (found.x, found.y) if found else (None, None)
+    place_fields = find_positions(fields, ())
+    return (place_fields.x, place_fields.y) if place_fields else (None, None)
 
 
 def _where(

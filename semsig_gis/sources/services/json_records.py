@@ -24,16 +24,16 @@ def find_records(content: Any) -> list[Any] | None:  # noqa: ANN401 - any JSON
     if not isinstance(content, dict):
         return None
     for key in KEYS:
-        named = content.get(key)
-        if isinstance(named, list):
-            return named
-    found = max(_candidates(content, DEEPEST), key=len, default=None)
-    if found is not None and "head" in content:
+        rows = content.get(key)
+        if isinstance(rows, list):
+            return rows
+    longest = max(_candidates(content, DEEPEST), key=len, default=None)
+    if longest is not None and "head" in content:
         return [
             {name: value.get("value") for name, value in row.items() if isinstance(value, dict)}
-            for row in found
+            for row in longest
         ]
-    return found
+    return longest
 
 
 def _candidates(content: dict[str, Any], depth: int) -> Iterator[list[Any]]:

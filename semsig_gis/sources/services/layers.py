@@ -98,16 +98,16 @@ class PositionReader:
         def own(name: str | None) -> str | None:
             return name and find_field(name, spec, table.fields)
 
-        known = [
+        usual = [
             PositionFields(field=field, order=order)
             for field, order in ((own(SHAPE), None), (own(POINT), LAT_LON))
             if field is not None
         ]
-        shape = [fields for fields in known if fields.field == own(SHAPE)]
+        shape = [fields for fields in usual if fields.field == own(SHAPE)]
         x, y, whole = (own(name) for name in (spec.x_field, spec.y_field, spec.geometry_field))
         stated = None
         # A file may lack the fields that the catalogue names if it has a shape, or no rows.
-        if (x and y) or whole or not (known or table.has_geometry or table.empty):
+        if (x and y) or whole or not (usual or table.has_geometry or table.empty):
             own_spec = dataclasses.replace(
                 spec,
                 x_field=x or spec.x_field,
@@ -116,13 +116,13 @@ class PositionReader:
             )
             stated = stated_fields(own_spec, table.fields, where=where)
         self._shape = [PlaceReader(fields, where) for fields in shape]
-        self._others = [PlaceReader(fields, where) for fields in known if fields not in shape]
+        self._others = [PlaceReader(fields, where) for fields in usual if fields not in shape]
         self._others += [PlaceReader(stated, where)] if stated else []
         self.notes: tuple[str, ...] = ()
-        if not (stated or known or table.empty):
-            found = self._found(table, where)
-            self._others += [PlaceReader(found, where)] if found else []
-            self.notes = found.questions if found else ()
+        if not (stated or usual or table.empty):
+            place_fields = self._found(table, where)
+            self._others += [PlaceReader(place_fields, where)] if place_fields else []
+            self.notes = place_fields.questions if place_fields else ()
         readers = (*self._shape, *self._others)
         self.fields = tuple(name for reader in readers for name in reader.fields.names)
 
@@ -133,12 +133,12 @@ class PositionReader:
         sample = [*itertools.islice(records, SAMPLE_ROWS)]
         if any(record.geometry for record in sample):
             return None
-        found = find_positions(table.fields, [record.values for record in sample])
-        if found is None and not table.has_geometry:
+        place_fields = find_positions(table.fields, [record.values for record in sample])
+        if place_fields is None and not table.has_geometry:
             raise SourceError(f"{where} {no_positions(table.fields)}.")
-        if found is not None and not found.sure:
-            raise SourceError(f"{where} {uncertain_positions(found)}.")
-        return found
+        if place_fields is not None and not place_fields.sure:
+            raise SourceError(f"{where} {uncertain_positions(place_fields)}.")
+        return place_fields
 
     @property
     def crs(self) -> CRS | None:

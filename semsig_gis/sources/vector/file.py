@@ -140,18 +140,18 @@ def _places(
 
     SourceError if there are none, or None if its geometries are only missing.
     """
-    found = stated_fields(spec, layer.fields, where=where)
-    if found is None:
+    place_fields = stated_fields(spec, layer.fields, where=where)
+    if place_fields is None:
         rows = [*first_rows_of(member, layer.fields, min(layer.rows, SAMPLE_ROWS))]
-        found = find_positions(layer.fields, rows, subject=str(member.layer))
-    if found is None and layer.geometry == NO_GEOMETRY:
+        place_fields = find_positions(layer.fields, rows, subject=str(member.layer))
+    if place_fields is None and layer.geometry == NO_GEOMETRY:
         raise SourceError(
             f"{where} has no geometry, and {no_positions(layer.fields)}; or give the layer that "
             "contains the positions."
         )
-    if found is not None and not found.sure:
-        raise SourceError(f"{where} {uncertain_positions(found)}.")
-    return None if found is None else PlaceReader(found, where)
+    if place_fields is not None and not place_fields.sure:
+        raise SourceError(f"{where} {uncertain_positions(place_fields)}.")
+    return None if place_fields is None else PlaceReader(place_fields, where)
 
 
 def _read_table(
@@ -267,12 +267,14 @@ def first_rows(
             rows = tuple(first_rows_of(member, info.fields, min(limit, info.rows)))
             plain_table = info.geometry == NO_GEOMETRY
             subject = f"{path.stem} {info.name}"
-            found = find_positions(info.fields, rows, subject=subject) if plain_table else None
-            yield info, rows, found
+            place_fields = (
+                find_positions(info.fields, rows, subject=subject) if plain_table else None
+            )
+            yield info, rows, place_fields
             continue
         readable = (row for row in table.rows() if not isinstance(row, str))
-        found = table.places.fields if table.places else None
-        yield info, tuple(itertools.islice(readable, limit)), found
+        place_fields = table.places.fields if table.places else None
+        yield info, tuple(itertools.islice(readable, limit)), place_fields
 
 
 def _layers(path: Path) -> tuple[Member, ...]:
