@@ -14,7 +14,7 @@ from sentences import refused
 
 from semsig_gis.core import SemsigError
 from semsig_gis.objects import draft_catalog, load
-from semsig_gis.sources import transform_points
+from semsig_gis.sources import parse_area, transform_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -78,3 +78,14 @@ def distances(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArra
     """Return the distance of each point to the nearest of other points."""
     between = first[:, None] - second[None, :]
     return np.asarray(np.hypot(*between.transpose(2, 0, 1)).min(axis=1))
+
+
+def test_last_word_of_a_name_is_the_class() -> None:
+    file = CASES / "R_dc_cabinets" / "traffic_signal_cabinets.geojson"
+    assert 'class = "street_cabinet"' in draft_catalog(file)
+
+
+@pytest.mark.parametrize("name", ["area.csv", "area.poly"])
+def test_areas_without_a_crs_are_degrees(name: str) -> None:
+    area = parse_area(str(CASES / "K_area" / name))
+    assert area.bounds == pytest.approx((4.834, 45.763, 4.837, 45.765))
