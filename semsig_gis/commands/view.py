@@ -43,7 +43,7 @@ class LeftOut(TypedDict):
 
 
 class ViewCounts(TypedDict):
-    """Counts of the views, pictures and objects, and the files that are no detections."""
+    """Counts of views, pictures and objects; files in no format, and why others were left out."""
 
     views: int
     photos: int
@@ -53,6 +53,7 @@ class ViewCounts(TypedDict):
     headings_from_north: dict[str, int]
     left_out: LeftOut
     unknown_files: list[str]
+    damaged_files: dict[str, str]
 
 
 @command(
@@ -234,23 +235,29 @@ class Views:
             shots={} if self.photos is None else read_shots(self.photos),
             folders=None if self.images is None else [self.images],
         )
-        pictures, unknown = self._pictures(names, reporter)
+        pictures, left_out = self._pictures(names, reporter)
         views, tally = builder.views(pictures, places=self.place)
         rows: list[dict[str, Any]] = []
         for name, built_view in views:
             time = {"time": tally.times[name]} if name in tally.times else {}
             rows.append({"id": name, **time, **built_view.to_dict(taxonomy)})
         write_whole(self.out, "".join(json.dumps(row) + "\n" for row in rows))
-        passed = [str(file) for file in unknown]
+        unknown = [str(file) for file, reason in left_out.items() if not reason]
+        damaged = {str(file): reason for file, reason in left_out.items() if reason}
         sentence = (
             f"{_many(len(views), 'view')} of {_many(tally.photos, 'picture')} with "
             f"{_many(tally.objects, 'object')}, {tally.ranges:,} with a range."
         )
         return Result(
-            values=lambda: {"views": len(views), **tally.to_dict(), "unknown_files": passed},
+            values=lambda: {
+                "views": len(views),
+                **tally.to_dict(),
+                "unknown_files": unknown,
+                "damaged_files": damaged,
+            },
             summary=[sentence],
             files={"views": self.out},
-            notes=[*_notes(passed, tally)],
+            notes=[*_notes(unknown, damaged, tally)],
         )
 
     def _maps(self) -> tuple[list[str], str | None]:
@@ -279,8 +286,8 @@ class Views:
 
     def _pictures(
         self, names: str | None, reporter: Reporter
-    ) -> tuple[Sequence[AnnotatedPicture], list[Path]]:
-        """Return the pictures with their boxes, and the files in no format of detections."""
+    ) -> tuple[Sequence[AnnotatedPicture], dict[Path, str]]:
+        """Return the pictures with their boxes, and why files were left out."""
         from semsig_gis.observation import detect_boxes, read_pictures
 
         if self.detector is None:
@@ -293,7 +300,7 @@ class Views:
                 min_score=self.min_score,
                 progress=advance,
             )
-        return pictures, []
+        return pictures, {}
 
 
 def _size(text: str | None) -> tuple[int, int] | None:
@@ -307,11 +314,14 @@ def _size(text: str | None) -> tuple[int, int] | None:
     return int(match[1]), int(match[2])
 
 
-def _notes(unknown: list[str], tally: Tally) -> Iterator[str]:
+def _notes(unknown: list[str], damaged: dict[str, str], tally: Tally) -> Iterator[str]:
     """Yield what was left out and which headings are unknown."""
     if unknown:
         more = f" and {len(unknown) - 1:,} more" if len(unknown) > 1 else ""
         yield f"left out: {unknown[0]}{more}, in no format of detections"
+    if damaged:
+        files = _many(len(damaged), "file")
+        yield f"left out: {files}: {next(iter(damaged.values())).rstrip('.')}"
     if tally.unusable:
         pictures = _many(len(tally.unusable), "picture")
         yield f"left out: {pictures}: {next(iter(tally.unusable.values()))}"

@@ -146,3 +146,11 @@ def test_other_texts_are_not_taken_for_labels(content: str, words: str, run: Run
     Path("p1.txt").write_text(content)
     sentence(run("view p1.txt --fov 60 --size 800x600 --out v.jsonl"), words)
     assert not Path("v.jsonl").exists()
+
+
+def test_damaged_file_is_left_out_of_a_folder(run: Run) -> None:
+    write_case("p1.jpg", "p1.jpg")
+    Path("e.json").write_text(Path("d.json").read_text()[:90])
+    code, out, err = run("view . --out v.jsonl --json")
+    assert (code, bearings(), *json.loads(out)["damaged_files"]) == (0, BOTH, "e.json")
+    assert "left out: 1 file: e.json is not JSON" in err

@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
+from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.camera import MOST_PIXELS
 from semsig_gis.observation.detectors.documents import INVALID
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 Corners = tuple[float, float, float, float]
 """Left, top, right and bottom."""
 NO_CORNERS: Corners = (math.nan, math.nan, math.nan, math.nan)
+
+NO_NUMBER = "has a box or a score that is not a number"
 
 _Shape = TypeVar("_Shape")
 _Corners = TypeVar("_Corners")
@@ -150,7 +153,7 @@ def box_of(
         left = top = right = bottom = value = math.nan
     numbers = left, top, right, bottom
     if any(map(math.isnan, (*numbers, value))):
-        return faulty_box(f"{where} has a box or a score that is not a number")
+        return faulty_box(f"{where} {NO_NUMBER}")
     in_range = all(abs(number) <= MOST_PIXELS for number in numbers)
     if not in_range or right <= left or bottom <= top:
         return faulty_box(f"{where} has the box {numbers}, not four numbers with sides above 0")
@@ -182,6 +185,32 @@ def bounds(points: Iterable[Iterable[Any]]) -> Corners:
     except INVALID:
         return NO_CORNERS
     return min(columns), min(rows), max(columns), max(rows)
+
+
+def read_boxes(
+    shapes: Iterable[_Shape], read: Callable[[_Shape, str], Box | None], where: str
+) -> tuple[tuple[Box, ...], int]:
+    """Return the boxes that a function reads from shapes, and the number of shapes without one.
+
+    The function is given a shape and its place for messages, and returns None for points and
+    lines. A shape that it cannot read becomes a box with a fault.
+    """
+    boxes, others = [], 0
+    for number, shape in enumerate(shapes, start=1):
+        place = f"{where} {number}"
+        try:
+            box = read(shape, place)
+        except KeyError as error:
+            box = faulty_box(f"{place} lacks {error}")
+        except INVALID as error:
+            own = isinstance(error, InputError)
+            fault = str(error).rstrip(".") if own else f"{place} {NO_NUMBER}"
+            box = faulty_box(fault)
+        if box is None:
+            others += 1
+        else:
+            boxes.append(box)
+    return tuple(boxes), others
 
 
 def corners_of(read: Callable[[_Shape], _Corners], shape: _Shape) -> _Corners | Corners:

@@ -622,7 +622,7 @@ def read_format(form: str, folder: Path) -> AnnotatedPicture:
         (folder / name).write_text(text)
     files = ["labels"] if form == "YOLO with data.yaml" else SAMPLES[form]
     (picture,), unknown = read_pictures([folder / name for name in files])
-    assert unknown == []
+    assert unknown == {}
     return picture
 
 
@@ -657,6 +657,14 @@ def test_every_format_gives_same_boxes(form: str, tmp_path: Path) -> None:
         ("Supervisely", "[[80, 100], [240, 200]]", "null"),
         ("BDD100K", '"x1": 80', '"x1": null'),
         ("answers of Rekognition, Vision or Roboflow", '"x": 160, ', ""),
+        ("LabelMe", '"label": "bench", ', ""),
+        ("LabelMe", '"shape_type": "rectangle", "points"', '"corners"'),
+        ("Supervisely", '"classTitle": "bench", ', ""),
+        ("BDD100K", '"category": "bench", ', ""),
+        ("Darwin", '"name": "bench", ', ""),
+        ("CVAT for images", 'label="bench" ', ""),
+        ("Datumaro", '"label_id": 0, ', ""),
+        ("KITTI label_2", "bench 0.00", "bench x"),
     ],
 )
 def test_one_shape_that_cannot_be_read_is_one_fault(
@@ -667,6 +675,35 @@ def test_one_shape_that_cannot_be_read_is_one_fault(
     (tmp_path / name).write_text(text.replace(part, bad, 1))
     (picture,), _ = read_pictures([tmp_path / name])
     assert [bool(box.fault) for box in picture.boxes] == [True, False]
+
+
+GOOD, DAMAGED = ("good.json", json.dumps(COCO)), ("damaged.json", json.dumps(COCO)[:50])
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        DAMAGED,
+        ("empty.json", ""),
+        ("a.xml", CVAT[:200]),
+        ("a.json", json.dumps({**COCO, "images": [{"id": 7}, 3]})),
+        ("a.json", json.dumps({**SUPERVISELY, "size": {}})),
+        ("a.txt", YOLO),
+    ],
+)
+@pytest.mark.parametrize("whole_folder", [True, False])
+def test_damaged_file_loses_that_file(
+    name: str, text: str, tmp_path: Path, *, whole_folder: bool
+) -> None:
+    for file, content in ((name, text), GOOD):
+        (tmp_path / file).write_text(content)
+    files = [tmp_path] if whole_folder else [tmp_path / name, tmp_path / "good.json"]
+    (picture,), left_out = read_pictures(files)
+    assert (len(picture.boxes), *left_out) == (2, tmp_path / name)
+    assert_sentence(InputError(left_out[tmp_path / name]), name)
+    (tmp_path / "good.json").write_text("[")
+    with refused(InputError):
+        read_pictures(files)
 
 
 def test_folder_with_all_formats_and_other_files_is_read(tmp_path: Path) -> None:
@@ -977,14 +1014,14 @@ def annotation(**values: object) -> str:
         ("a.xml", VOC.replace(">80<", ">900<"), "object 1 has the box (900.0, 100.0, 240.0"),
         ("a.xml", VOC.replace(">800<", ">wide<"), "does not follow its format, Pascal VOC"),
         ("a.json", json.dumps({**LABELME, "shapes": [{"label": "x"}]}),
-         "does not follow its format, LabelMe (it lacks 'points')"),
+         "shape 1 lacks 'points'"),
         ("a.json", json.dumps({**LABELME, "shapes": [{"label": "x", "points": []}]}),
          "shape 1 has a box or a score that is not a number"),
         ("a.json", json.dumps({"a": {"filename": "a", "regions": [{}]}}),
-         "does not follow its format, VIA (it lacks 'shape_attributes')"),
+         "region 1 lacks 'shape_attributes'"),
         ("a.json", json.dumps({**SUPERVISELY, "size": {"width": 9}}), "lacks 'height'"),
         ("a.json", json.dumps(SUPERVISELY).replace('"eJ', '"AA'), "has a box or a score"),
-        ("a.json", json.dumps([{"name": "a", "labels": [{"box2d": {"x1": 1}}]}]), "'category'"),
+        ("a.json", json.dumps([{"name": "a", "labels": [{"box2d": {"x1": 1}}]}]), "lacks 'y1'"),
         ("a.json", json.dumps({**ITEM, "id": 3}).replace("0.75", "sure"),
          "picture 3, annotation 2 has a box or a score that is not a number"),
         ("a.json", json.dumps({"properties": ITEM["properties"]}), "Panoramax (it lacks 'id')"),
@@ -992,7 +1029,7 @@ def annotation(**values: object) -> str:
         ("a.csv", ROBOFLOW + "street.jpg,800,400,bench,80,,240,200\n", "line 4 has a box"),
         ("a.csv", ROBOFLOW + "street.jpg\n", "line 4 has a box"),
         ("a.txt", KITTI + "bench 0 0\n", "line 4 has 3 values; a line of KITTI has 15"),
-        ("a.txt", KITTI.replace("bench 0.00", "bench x"), "does not follow its format, KITTI"),
+        ("a.txt", KITTI.replace("bench 0.00", "bench x"), "line 1 has a box or a score"),
         ("a.txt", KITTI.replace("0.75", "75"), "line 2 has the score 75"),
         ("a.txt", "Some words.\n", "contains no detections in a known format"),
         ("a.xml", "<!DOCTYPE a><a/>", "its own document type"),

@@ -63,7 +63,7 @@ NAME_FILES = frozenset({"classes.txt"})
 
 def read_pictures(
     paths: Iterable[str | Path],
-) -> tuple[list[AnnotatedPicture], list[Path]]:
+) -> tuple[list[AnnotatedPicture], dict[Path, str]]:
     """Read pictures and boxes from files of detections; the format is found by the content.
 
     A folder means the files of all formats in it and in its folders, a file of class names without
@@ -71,44 +71,65 @@ def read_pictures(
     the same folder or up to two above. COCO results need a file of images and categories among the
     files. A box that cannot be used has a `fault`.
 
-    Returns the pictures, and the files of folders that are in no format. InputError if a file
-    cannot be read or has another format, or no box can be used.
+    Returns the pictures, and why files were left out if others can be read: an empty text for the
+    files of folders that are in no format. InputError if there is no file to read, no file can be
+    read, or no box can be used.
     """
-    documents: list[Document] = []
-    unknown: list[Path] = []
-    for path in map(Path, paths):
-        if path.is_dir():
-            inside = [read_document(file) for file in _files_in(path)]
-            labels = [document for document in inside if _format(document)]
-            if not labels:
-                raise InputError(
-                    f"the folder {path} contains no file of detections; {_accepted()}."
-                )
-            documents += labels
-            unknown += [document.file for document in inside if not _format(document)]
-        elif _has_class_names(path):
-            documents.append(Document(file=path, content=None))
-        elif path.suffix.lower() in PARSERS:
-            documents.append(read_document(path))
-        else:
-            raise InputError(f"{path} is not in a supported format; {_accepted()}.")
+    left_out: dict[Path, str] = {}
+    documents = [document for path in paths for document in _documents(Path(path), left_out)]
     labels = [document for document in documents if not _has_class_names(document.file)]
-    if documents and not labels:  # only names of classes: the labels are in folders next to them
-        files = {
-            file
-            for document in documents
-            for folder in _folders_of(document.file)
-            for file in _files_in(folder)
-        }
-        labels = [item for item in map(read_document, sorted(files)) if _format(item)]
-        if not labels:
-            names = documents[0].file
-            raise InputError(f"{names} has names of classes, and no labels; {_accepted()}.")
-    pictures = [picture for document in labels for picture in _pictures(document, documents)]
+    if documents and not labels and not left_out:  # only names of classes
+        labels = _labels_near(documents, left_out)
+    pictures: list[AnnotatedPicture] = []
+    for document in labels:
+        try:
+            pictures += _pictures(document, documents)
+        except InputError as error:
+            left_out[document.file] = str(error)
+    if not pictures and any(left_out.values()):
+        raise InputError(next(filter(None, left_out.values())))
     boxes = [box for picture in pictures for box in picture.boxes]
     if boxes and all(box.fault for box in boxes):
         raise InputError(f"{boxes[0].fault}; correct the file, or export it again.")
-    return pictures, unknown
+    return pictures, left_out
+
+
+def _documents(path: Path, left_out: dict[Path, str]) -> list[Document]:
+    """Return a file, or the files of detections in a folder; add why others cannot be read."""
+    if path.is_dir():
+        files = _files_in(path)
+        documents = _read(files, left_out)
+        labels = [document for document in documents if _format(document)]
+        if not labels and left_out.keys().isdisjoint(files):
+            raise InputError(f"the folder {path} contains no file of detections; {_accepted()}.")
+        left_out |= {item.file: "" for item in documents if not _format(item)}
+        return labels
+    if _has_class_names(path):
+        return [Document(file=path, content=None)]
+    if path.suffix.lower() not in PARSERS:
+        raise InputError(f"{path} is not in a supported format; {_accepted()}.")
+    return _read([path], left_out) if path.is_file() else [read_document(path)]
+
+
+def _labels_near(names: Sequence[Document], left_out: dict[Path, str]) -> list[Document]:
+    """Return the labels in the folders of files of class names, or next to them."""
+    folders = {folder for item in names for folder in _folders_of(item.file)}
+    files = {file for folder in folders for file in _files_in(folder)}
+    labels = [item for item in _read(sorted(files), left_out) if _format(item)]
+    if not labels and not left_out:
+        raise InputError(f"{names[0].file} has names of classes, and no labels; {_accepted()}.")
+    return labels
+
+
+def _read(files: Iterable[Path], left_out: dict[Path, str]) -> list[Document]:
+    """Return the files that can be read, and add why others cannot to `left_out`."""
+    documents = []
+    for file in files:
+        try:
+            documents.append(read_document(file))
+        except InputError as error:
+            left_out[file] = str(error)
+    return documents
 
 
 def _folders_of(names: Path) -> list[Path]:

@@ -10,7 +10,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
-    corners_of,
+    read_boxes,
     size_of,
 )
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from semsig_gis.observation.detectors.documents import Document
-    from semsig_gis.observation.detectors.pictures import Corners
+    from semsig_gis.observation.detectors.pictures import Box, Corners
 
 HIDDEN = ("occluded", "truncated")
 CORNERS = ("x1", "y1", "x2", "y2")
@@ -53,28 +53,24 @@ def _frames(content: Any) -> list[dict[str, Any]]:  # noqa: ANN401 - any JSON
 
 
 def _picture(frame: dict[str, Any], size: dict[str, Any], source: str) -> AnnotatedPicture:
-    boxes, others = [], 0
-    for number, label in enumerate(frame.get("labels") or frame.get("objects") or (), start=1):
-        attributes = label.get("attributes") or {}
-        corners = None if attributes.get("crowd") else corners_of(_corners, label)
-        if corners is None:
-            others += 1
-            continue
-        box = box_of(
-            label["category"],
-            corners,
-            f"{source}, frame {frame['name']}, label {number}",
-            score=label.get("score"),
-            whole=not any(attributes.get(name) for name in HIDDEN),
-        )
-        boxes.append(box)
+    labels = frame.get("labels") or frame.get("objects") or ()
+    boxes, others = read_boxes(labels, _box, f"{source}, frame {frame['name']}, label")
     size = frame.get("size") or size
     return AnnotatedPicture(
         name=str(frame["name"]),
-        boxes=tuple(boxes),
+        boxes=boxes,
         others=others,
         shot=Shot(size=size_of(size.get("width"), size.get("height"))),
     )
+
+
+def _box(label: dict[str, Any], where: str) -> Box | None:
+    attributes = label.get("attributes") or {}
+    corners = None if attributes.get("crowd") else _corners(label)
+    if corners is None:
+        return None
+    hidden = any(attributes.get(name) for name in HIDDEN)
+    return box_of(label["category"], corners, where, score=label.get("score"), whole=not hidden)
 
 
 def _corners(label: dict[str, Any]) -> Corners | None:

@@ -80,6 +80,9 @@ def _pictures(
         if not isinstance(item, dict):
             unlisted.append(faulty_box(f"{where} is not an object"))
             continue
+        if "image_id" not in item:
+            unlisted.append(faulty_box(f"{where} lacks 'image_id'"))
+            continue
         image, category = str(item["image_id"]), str(item.get("category_id"))
         image = image if image in boxes else stems.get(image, image)
         if image not in boxes or category not in names:

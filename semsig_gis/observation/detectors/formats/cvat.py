@@ -11,7 +11,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
-    corners_of,
+    read_boxes,
     size_of,
     turned,
 )
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from xml.etree import ElementTree as ET
 
     from semsig_gis.observation.detectors.documents import Document
-    from semsig_gis.observation.detectors.pictures import Corners
+    from semsig_gis.observation.detectors.pictures import Box, Corners
 
 CORNERS = ("xtl", "ytl", "xbr", "ybr")
 MASK = ("left", "top", "width", "height")
@@ -45,27 +45,27 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
 
 def _picture(image: ET.Element, source: str) -> AnnotatedPicture:
     name = image.attrib["name"]
-    boxes, others = [], 0
-    for number, shape in enumerate(image, start=1):
-        corners = corners_of(_corners, shape)
-        if corners is None:
-            others += shape.tag != "tag"
-            continue
-        attributes = {item.get("name"): item.text for item in shape.iter("attribute")}
-        box = box_of(
-            shape.attrib["label"],
-            corners,
-            f"{source}, image {name!r}, shape {number}",
-            score=attributes.get("score", attributes.get("confidence")),
-            whole=shape.get("occluded", "0") != "1",
-        )
-        boxes.append(box)
+    shapes = (shape for shape in image if shape.tag != "tag")
+    boxes, others = read_boxes(shapes, _box, f"{source}, image {name!r}, shape")
     size = size_of(image.get("width"), image.get("height"))
-    return AnnotatedPicture(name=name, boxes=tuple(boxes), others=others, shot=Shot(size=size))
+    return AnnotatedPicture(name=name, boxes=boxes, others=others, shot=Shot(size=size))
+
+
+def _box(shape: ET.Element, where: str) -> Box | None:
+    if (corners := _corners(shape)) is None:
+        return None
+    attributes = {item.get("name"): item.text for item in shape.iter("attribute")}
+    return box_of(
+        shape.attrib["label"],
+        corners,
+        where,
+        score=attributes.get("score", attributes.get("confidence")),
+        whole=shape.get("occluded", "0") != "1",
+    )
 
 
 def _corners(shape: ET.Element) -> Corners | None:
-    """Return the corners of a shape; None for points, lines and tags."""
+    """Return the corners of a shape; None for points and lines."""
     if shape.tag == "polygon":
         return bounds(point.split(",") for point in shape.attrib["points"].split(";"))
     if shape.tag == "box":

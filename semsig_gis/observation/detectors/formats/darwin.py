@@ -10,7 +10,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
-    corners_of,
+    read_boxes,
     size_of,
 )
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from semsig_gis.observation.detectors.documents import Document
-    from semsig_gis.observation.detectors.pictures import Corners
+    from semsig_gis.observation.detectors.pictures import Box, Corners
 
 
 def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
@@ -34,24 +34,24 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture; points, lines and tags are counted."""
     item = document.content["item"]
-    boxes, others = [], 0
-    for number, shape in enumerate(document.content["annotations"], start=1):
-        corners = corners_of(_corners, shape)
-        if corners is None:
-            others += 1
-            continue
-        where = f"{document.file}, annotation {number}"
-        score = (shape.get("inference") or {}).get("confidence")
-        boxes.append(box_of(shape["name"], corners, where, score=score))
+    annotations = document.content["annotations"]
+    boxes, others = read_boxes(annotations, _box, f"{document.file}, annotation")
     slot: dict[str, Any] = next(iter(item.get("slots") or []), {})
     return [
         AnnotatedPicture(
             name=str(item["name"]),
-            boxes=tuple(boxes),
+            boxes=boxes,
             others=others,
             shot=Shot(size=size_of(slot.get("width"), slot.get("height"))),
         )
     ]
+
+
+def _box(shape: dict[str, Any], where: str) -> Box | None:
+    if (corners := _corners(shape)) is None:
+        return None
+    score = (shape.get("inference") or {}).get("confidence")
+    return box_of(shape["name"], corners, where, score=score)
 
 
 def _corners(shape: dict[str, Any]) -> Corners | None:

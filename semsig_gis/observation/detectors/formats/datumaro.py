@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.observation.detectors.documents import INVALID
 from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.formats.coco import mask_corners
 from semsig_gis.observation.detectors.pictures import (
@@ -13,6 +12,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
+    read_boxes,
     size_of,
 )
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from semsig_gis.observation.detectors.documents import Document
-    from semsig_gis.observation.detectors.pictures import Corners
+    from semsig_gis.observation.detectors.pictures import Box, Corners
 
 SHAPES = frozenset({"bbox", "polygon", "mask"})
 
@@ -38,29 +38,22 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
 
 
 def _picture(item: dict[str, Any], names: Sequence[str], source: str) -> AnnotatedPicture:
-    boxes, others = [], 0
-    for number, shape in enumerate(item.get("annotations") or [], start=1):
+
+    def box(shape: dict[str, Any], where: str) -> Box | None:
         if shape.get("type") not in SHAPES:
-            others += 1
-            continue
+            return None
         attributes = shape.get("attributes") or {}
-        try:
-            label, corners = names[shape["label_id"]], _corners(shape)
-        except INVALID:
-            label, corners = "", NO_CORNERS
-        box = box_of(
-            label,
-            corners,
-            f"{source}, item {item['id']}, annotation {number}",
-            score=attributes.get("score"),
-            whole=not (attributes.get("occluded") or attributes.get("truncated")),
-        )
-        boxes.append(box)
+        hidden = attributes.get("occluded") or attributes.get("truncated")
+        label, score = names[shape["label_id"]], attributes.get("score")
+        return box_of(label, _corners(shape), where, score=score, whole=not hidden)
+
+    annotations = item.get("annotations") or []
+    boxes, others = read_boxes(annotations, box, f"{source}, item {item['id']}, annotation")
     image = item.get("image") or item.get("media") or {}
     height, width = image.get("size") or (None, None)
     return AnnotatedPicture(
         name=str(image.get("path") or item["id"]),
-        boxes=tuple(boxes),
+        boxes=boxes,
         others=others,
         shot=Shot(size=size_of(width, height)),
     )

@@ -11,7 +11,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
-    corners_of,
+    read_boxes,
     size_of,
 )
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from semsig_gis.observation.detectors.documents import Document
-    from semsig_gis.observation.detectors.pictures import Corners
+    from semsig_gis.observation.detectors.pictures import Box, Corners
 
 OUTLINES = frozenset({"polygon", "rectangle", "rotation", "mask", "circle"})
 
@@ -33,24 +33,24 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture; points and lines are counted."""
     content = document.content
-    boxes, others = [], 0
-    for number, shape in enumerate(content["shapes"], start=1):
-        # Old files have polygons without a type.
-        kind, points = shape.get("shape_type") or "polygon", shape["points"]
-        if kind not in OUTLINES:
-            others += 1
-            continue
-        corners = bounds(points) if kind != "circle" else corners_of(_circle, points)
-        where = f"{document.file}, shape {number}"
-        boxes.append(box_of(shape["label"], corners, where, score=shape.get("score")))
+    boxes, others = read_boxes(content["shapes"], _box, f"{document.file}, shape")
     return [
         AnnotatedPicture(
             name=str(content["imagePath"] or document.file.stem),
-            boxes=tuple(boxes),
+            boxes=boxes,
             others=others,
             shot=Shot(size=size_of(content.get("imageWidth"), content.get("imageHeight"))),
         )
     ]
+
+
+def _box(shape: dict[str, Any], where: str) -> Box | None:
+    # Old files have polygons without a type.
+    kind, points = shape.get("shape_type") or "polygon", shape["points"]
+    if kind not in OUTLINES:
+        return None
+    corners = bounds(points) if kind != "circle" else _circle(points)
+    return box_of(shape["label"], corners, where, score=shape.get("score"))
 
 
 def _circle(points: list[list[float]]) -> Corners:

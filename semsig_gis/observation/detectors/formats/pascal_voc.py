@@ -12,6 +12,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
+    read_boxes,
     size_of,
     turned,
 )
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from xml.etree import ElementTree as ET
 
     from semsig_gis.observation.detectors.documents import Document
+    from semsig_gis.observation.detectors.pictures import Box
 
 ROTATED = ("cx", "cy", "w", "h", "angle")
 CORNERS = ("xmin", "ymin", "xmax", "ymax")
@@ -52,24 +54,23 @@ def _corners(item: ET.Element) -> Sequence[str | float | None] | None:
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture; objects without an outline are counted."""
     root = document.content
-    boxes, others = [], 0
-    for number, item in enumerate(root.iterfind("object"), start=1):
-        corners = _corners(item)
-        if corners is None:
-            others += 1
-            continue
-        label = (item.findtext("name") or "").strip() or "no label"
-        hidden = any((item.findtext(name) or "0").strip() == "1" for name in PARTLY_HIDDEN)
-        score = item.findtext("score") or item.findtext("confidence")
-        where = f"{document.file}, object {number}"
-        boxes.append(box_of(label, corners, where, score=score, whole=not hidden))
+    boxes, others = read_boxes(root.iterfind("object"), _box, f"{document.file}, object")
     # Files that were written without the picture have the size 0.
     width, height = root.findtext("size/width"), root.findtext("size/height")
     return [
         AnnotatedPicture(
             name=(root.findtext("filename") or "").strip() or document.file.stem,
-            boxes=tuple(boxes),
+            boxes=boxes,
             others=others,
             shot=Shot(size=size_of(width, height)),
         )
     ]
+
+
+def _box(item: ET.Element, where: str) -> Box | None:
+    if (corners := _corners(item)) is None:
+        return None
+    label = (item.findtext("name") or "").strip() or "no label"
+    hidden = any((item.findtext(name) or "0").strip() == "1" for name in PARTLY_HIDDEN)
+    score = item.findtext("score") or item.findtext("confidence")
+    return box_of(label, corners, where, score=score, whole=not hidden)

@@ -13,7 +13,7 @@ from semsig_gis.observation.detectors.pictures import (
     Shot,
     bounds,
     box_of,
-    corners_of,
+    read_boxes,
     size_of,
 )
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from semsig_gis.observation.detectors.documents import Document
-    from semsig_gis.observation.detectors.pictures import Corners
+    from semsig_gis.observation.detectors.pictures import Box, Corners
 
 OUTLINES = frozenset({"rectangle", "polygon"})
 PARTLY_HIDDEN = frozenset({"truncated", "occluded"})
@@ -37,31 +37,24 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture, named by the file; points and lines are counted."""
     content = document.content
-    boxes, others = [], 0
-    for number, item in enumerate(content["objects"], start=1):
-        corners = corners_of(_corners, item)
-        if corners is None:
-            others += 1
-            continue
-        tags = {
-            str(tag["name"]).casefold(): tag.get("value")
-            for tag in item.get("tags") or ()
-            if isinstance(tag, dict)
-        }
-        box = box_of(
-            item["classTitle"],
-            corners,
-            f"{document.file}, object {number}",
-            score=tags.get("confidence"),
-            whole=not PARTLY_HIDDEN & tags.keys(),
-        )
-        boxes.append(box)
+    boxes, others = read_boxes(content["objects"], _box, f"{document.file}, object")
     size = size_of(content["size"]["width"], content["size"]["height"])
     return [
-        AnnotatedPicture(
-            name=document.file.stem, boxes=tuple(boxes), others=others, shot=Shot(size=size)
-        )
+        AnnotatedPicture(name=document.file.stem, boxes=boxes, others=others, shot=Shot(size=size))
     ]
+
+
+def _box(item: dict[str, Any], where: str) -> Box | None:
+    if (corners := _corners(item)) is None:
+        return None
+    tags = {
+        str(tag["name"]).casefold(): tag.get("value")
+        for tag in item.get("tags") or ()
+        if isinstance(tag, dict)
+    }
+    hidden = PARTLY_HIDDEN & tags.keys()
+    score = tags.get("confidence")
+    return box_of(item["classTitle"], corners, where, score=score, whole=not hidden)
 
 
 def _corners(item: dict[str, Any]) -> Corners | None:

@@ -9,14 +9,14 @@ from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     bounds,
     box_of,
-    corners_of,
+    read_boxes,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from semsig_gis.observation.detectors.documents import Document
-    from semsig_gis.observation.detectors.pictures import Corners
+    from semsig_gis.observation.detectors.pictures import Box, Corners
 
 PROJECT = "_via_img_metadata"
 LABELS = ("label", "class", "name", "type", "category", "object")
@@ -42,17 +42,18 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
 
 def _picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
     regions = image["regions"]
-    boxes, others = [], 0
-    for number, region in enumerate(
-        regions.values() if isinstance(regions, dict) else regions, start=1
-    ):
-        corners = corners_of(_corners, region["shape_attributes"])
-        if corners is None:
-            others += 1
-            continue
-        where = f"{source}, image {image['filename']}, region {number}"
-        boxes.append(box_of(_label(region.get("region_attributes") or {}), corners, where))
-    return AnnotatedPicture(name=str(image["filename"]), boxes=tuple(boxes), others=others)
+    boxes, others = read_boxes(
+        regions.values() if isinstance(regions, dict) else regions,
+        _box,
+        f"{source}, image {image['filename']}, region",
+    )
+    return AnnotatedPicture(name=str(image["filename"]), boxes=boxes, others=others)
+
+
+def _box(region: dict[str, Any], where: str) -> Box | None:
+    if (corners := _corners(region["shape_attributes"])) is None:
+        return None
+    return box_of(_label(region.get("region_attributes") or {}), corners, where)
 
 
 def _label(attributes: dict[str, Any]) -> str:
