@@ -113,7 +113,6 @@ def draft_catalog(path: str | Path, *, crs: AnyCrs | None = None) -> str:
     Examples
     --------
     >>> import tempfile
-    from collections import Counter
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder, "town_benches.csv")
     ...     _ = path.write_text("id;lon;lat;wood\n7;3.88;43.61;yes\n8;3.89;43.61;no\n")

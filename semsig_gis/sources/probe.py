@@ -6,6 +6,7 @@ import contextlib
 import functools
 import re
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Literal
@@ -98,7 +99,7 @@ def text_format(path: Path) -> Literal["osm", "overpass"] | SourceFormat | None:
     try:
         with open_unpacked(path) as stream:
             start = stream.read(START_BYTES)
-    except (EOFError, OSError):
+    except (EOFError, OSError, zlib.error):
         if packed:
             return None  # not of this format, or damaged
         raise

@@ -48,7 +48,7 @@ SPEC = LayerSpec(name="a", class_name="bench", id_field="n", where=(("many", ("a
         (f"<gml:Curve><gml:segments>{SEGMENT}</gml:segments></gml:Curve>", "LINESTRING (0 1, 2 3)"),
         (
             f"<gml:MultiPoint><gml:pointMembers>{TWO}</gml:pointMembers></gml:MultiPoint>",
-            "MULTIPOINT (1 2, 3 4)",
+            "POINT (1 2); POINT (3 4)",
         ),
         ("<gml:Polygon><gml:exterior/></gml:Polygon>", None),
         ("<gml:Point><gml:pos>here</gml:pos></gml:Point>", None),
@@ -63,8 +63,10 @@ def test_gml_geometries_are_read(
     if text is None:
         assert "is not valid GML" in layer.errors[0]
     else:
-        assert layer.table.geometry.tolist() == [shapely.from_wkt(text)]
-        assert layer.table["source_id"].tolist() == ["7"]
+        shapes = [shapely.from_wkt(part) for part in text.split("; ")]
+        assert layer.table.geometry.tolist() == shapes
+        ids = ["7"] if len(shapes) == 1 else ["7/1", "7/2"]
+        assert layer.table["source_id"].tolist() == ids
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import dataclasses
 import itertools
 import operator
 import re
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Literal
@@ -110,7 +111,7 @@ def load_document(path: Path, *, where: str) -> Document:
         # The remark becomes a part of a sentence.
         remark = " ".join(str(remark).split()).rstrip(".").replace(". ", ", ")
         return Document(_current(elements), remark[:LONGEST_REMARK])
-    except (ET.ParseError, EOFError) as error:
+    except (ET.ParseError, EOFError, zlib.error) as error:
         raise SourceError(f"{where} is not whole XML ({error}); download it again.") from error
     except OSError as error:
         raise SourceError(
@@ -152,7 +153,7 @@ def xml_form(path: Path) -> Literal["plain", "versions", "dialect"]:
                     last = names[-1]
                     if any(itertools.starmap(operator.eq, itertools.pairwise(names))):
                         form = "versions"
-    except (EOFError, OSError):
+    except (EOFError, OSError, zlib.error):
         pass  # pyosmium reports what is damaged
     return form
 

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from semsig_gis.core import SourceError, UnknownNameError, crs_label, nearest_name
 from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
@@ -240,13 +242,21 @@ def _read_rows(
             if position is None and rows.numbers[row] not in layer.empty:
                 rows.positions[row] = "its geometry is not valid GeoJSON"
     guess = member.guess if member.encoding is None else None
-    if guess is not None and guess not in EXPECTED:
+    texts = itertools.chain.from_iterable(map(_texts, rows.columns.values()))
+    if guess is not None and guess not in EXPECTED and not all(map(str.isascii, texts)):
         notes = (
             f"the encoding is not stated; read as {guess.encoding}"
             + ("" if guess.sure else ", which is not sure: state the right one as encoding"),
             *notes,
         )
     return rows, (*member.notes, *notes)
+
+
+def _texts(column: pa.Array | list[Any]) -> Iterator[str]:
+    """Yield the distinct texts of a column."""
+    if isinstance(column, pa.Array):
+        column = pc.unique(column).to_pylist()
+    yield from (value for value in column if isinstance(value, str))
 
 
 def read_layers(
