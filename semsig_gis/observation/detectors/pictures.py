@@ -14,7 +14,7 @@ from semsig_gis.observation.detectors.camera import MOST_PIXELS
 from semsig_gis.observation.detectors.documents import INVALID
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from semsig_gis.observation.detectors.camera import Projection
 
@@ -22,6 +22,7 @@ Corners = tuple[float, float, float, float]
 """Left, top, right and bottom."""
 NO_CORNERS: Corners = (math.nan, math.nan, math.nan, math.nan)
 
+NO_SCORE = frozenset({"none", "null", "nan", "n/a", "na", "-", ""})
 NO_NUMBER = "has a box or a score that is not a number"
 
 _Shape = TypeVar("_Shape")
@@ -143,20 +144,27 @@ class AnnotatedPicture:
 
 
 def box_of(
-    label: object, corners: Iterable[Any], where: str, *, score: object = None, whole: bool = True
+    label: object, corners: Iterable[Any], where: str, *, score: object = 1.0, whole: bool = True
 ) -> Box:
-    """Return a box, with a fault that names the place `where` if it is invalid."""
+    """Return a box, with a fault that names the place `where` if it is invalid.
+
+    A box without a score has the score NaN and a fault, which is for files with other scores.
+    """
     try:
         left, top, right, bottom = (float(corner) for corner in corners)
-        value = 1.0 if score is None else float(str(score))
+        empty = str(score).strip().casefold() in NO_SCORE
+        value = math.nan if empty else float(str(score))
     except INVALID:
         left = top = right = bottom = value = math.nan
     numbers = left, top, right, bottom
-    if any(map(math.isnan, (*numbers, value))):
+    if any(map(math.isnan, numbers)):
         return faulty_box(f"{where} {NO_NUMBER}")
     in_range = all(abs(number) <= MOST_PIXELS for number in numbers)
     if not in_range or right <= left or bottom <= top:
         return faulty_box(f"{where} has the box {numbers}, not four numbers with sides above 0")
+    if empty:
+        fault = f"{where} has no score, which others have"
+        return Box(label=str(label), corners=numbers, score=value, whole=whole, fault=fault)
     if not 0 <= value <= 1:
         return faulty_box(f"{where} has the score {value:g}, not a number from 0 to 1")
     return Box(label=str(label), corners=numbers, score=value, whole=whole)
@@ -165,6 +173,22 @@ def box_of(
 def faulty_box(fault: str) -> Box:
     """Return a box that cannot be used."""
     return Box(label="", corners=(0.0, 0.0, 0.0, 0.0), fault=fault)
+
+
+def scored(pictures: Sequence[AnnotatedPicture]) -> list[AnnotatedPicture]:
+    """Return the pictures of a file; if it has no scores, those of all boxes are 1."""
+    if any(not box.fault for picture in pictures for box in picture.boxes):
+        return [*pictures]
+    return [
+        replace(
+            picture,
+            boxes=tuple(
+                replace(box, score=1.0, fault="") if math.isnan(box.score) else box
+                for box in picture.boxes
+            ),
+        )
+        for picture in pictures
+    ]
 
 
 def same_shape(first: tuple[float, float], second: tuple[float, float]) -> bool:

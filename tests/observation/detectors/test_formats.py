@@ -677,6 +677,37 @@ def test_one_shape_that_cannot_be_read_is_one_fault(
     assert [bool(box.fault) for box in picture.boxes] == [True, False]
 
 
+@pytest.mark.parametrize(
+    ("form", "empty"),
+    [
+        *((form, "null") for form in ("COCO", "BDD100K", "Datumaro", "Darwin", "Label Studio")),
+        *((form, '"n/a"') for form in ("COCO", "LabelMe", "Supervisely")),
+        ("COCO", "NaN"),
+        ("Panoramax", "nan"),
+        ("Pascal VOC", "n/a"),
+        ("CVAT for images", "-"),
+        ("YOLO with data.yaml (polygons)", "nan"),
+    ],
+)
+def test_box_without_score_is_one_fault_where_others_have_scores(
+    form: str, empty: str, tmp_path: Path
+) -> None:
+    texts = {name: text.replace("0.75", empty) for name, text in SAMPLES[form].items()}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    (picture,), _ = read_pictures([tmp_path / name for name in texts])
+    assert ["has no score" in box.fault for box in picture.boxes] == [False, True]
+
+
+def test_boxes_count_as_certain_where_none_has_a_score(tmp_path: Path) -> None:
+    items = [{**item, "score": None} for item in COCO["annotations"]]
+    (tmp_path / "a.json").write_text(json.dumps({**COCO, "annotations": items}))
+    header, *rows = ROBOFLOW.splitlines()
+    (tmp_path / "b.csv").write_text("\n".join([f"{header},score", *(f"{row}," for row in rows)]))
+    for picture in read_pictures([tmp_path])[0]:
+        assert [(box.score, box.fault) for box in picture.boxes] == [(1.0, "")] * 2
+
+
 GOOD, DAMAGED = ("good.json", json.dumps(COCO)), ("damaged.json", json.dumps(COCO)[:50])
 
 

@@ -21,7 +21,7 @@ from semsig_gis.observation.detectors.documents import (
     read_document,
     text_of,
 )
-from semsig_gis.observation.detectors.pictures import AnnotatedPicture
+from semsig_gis.observation.detectors.pictures import AnnotatedPicture, scored
 
 Pictures = Callable[[Document, Sequence[Document]], Iterable[AnnotatedPicture]]
 
@@ -149,7 +149,7 @@ def _pictures(document: Document, documents: Sequence[Document]) -> list[Annotat
     if form is None:
         raise InputError(f"{file} contains no detections in a known format; {_accepted()}.")
     try:
-        pictures = form.pictures(document, documents)
+        pictures = scored([*form.pictures(document, documents)])
         return [replace(picture, folder=file.parent) for picture in pictures]
     except INVALID as error:
         if isinstance(error, InputError):

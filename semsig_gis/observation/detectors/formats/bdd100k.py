@@ -70,7 +70,9 @@ def _box(label: dict[str, Any], where: str) -> Box | None:
     if corners is None:
         return None
     hidden = any(attributes.get(name) for name in HIDDEN)
-    return box_of(label["category"], corners, where, score=label.get("score"), whole=not hidden)
+    return box_of(
+        label["category"], corners, where, score=label.get("score", 1.0), whole=not hidden
+    )
 
 
 def _corners(label: dict[str, Any]) -> Corners | None:

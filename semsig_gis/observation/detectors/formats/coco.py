@@ -97,7 +97,9 @@ def _pictures(
         if corners is None:
             others[image] += 1
         else:
-            boxes[image].append(box_of(names[category], corners, where, score=item.get("score")))
+            boxes[image].append(
+                box_of(names[category], corners, where, score=item.get("score", 1.0))
+            )
     if unlisted and (len(unlisted) == len(annotations) or not boxes):
         raise InputError(f"{unlisted[0].fault}; give the file that lists it.")
     if boxes:

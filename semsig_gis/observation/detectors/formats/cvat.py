@@ -59,7 +59,7 @@ def _box(shape: ET.Element, where: str) -> Box | None:
         shape.attrib["label"],
         corners,
         where,
-        score=attributes.get("score", attributes.get("confidence")),
+        score=attributes.get("score", attributes.get("confidence", 1.0)),
         whole=shape.get("occluded", "0") != "1",
     )
 

@@ -50,7 +50,7 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
 def _box(shape: dict[str, Any], where: str) -> Box | None:
     if (corners := _corners(shape)) is None:
         return None
-    score = (shape.get("inference") or {}).get("confidence")
+    score = (shape.get("inference") or {}).get("confidence", 1.0)
     return box_of(shape["name"], corners, where, score=score)
 
 

@@ -44,7 +44,7 @@ def _picture(item: dict[str, Any], names: Sequence[str], source: str) -> Annotat
             return None
         attributes = shape.get("attributes") or {}
         hidden = attributes.get("occluded") or attributes.get("truncated")
-        label, score = names[shape["label_id"]], attributes.get("score")
+        label, score = names[shape["label_id"]], attributes.get("score", 1.0)
         return box_of(label, _corners(shape), where, score=score, whole=not hidden)
 
     annotations = item.get("annotations") or []

@@ -45,7 +45,7 @@ def _box(words: Sequence[str], where: str) -> Box | None:
             f"{where} has {len(words)} values; a line of KITTI has 15, and a score if it is of a "
             "detector"
         )
-    score = words[VALUES] if len(words) > VALUES else None
+    score = words[VALUES] if len(words) > VALUES else 1.0
     # Both are 0 for a whole object, and -1 if they are unknown.
     whole = max(float(words[1]), float(words[2])) <= 0
     return box_of(words[0], words[4:8], where, score=score, whole=whole)

@@ -87,7 +87,7 @@ def _picture(task: dict[str, Any], source: str) -> AnnotatedPicture:
             corners = _corners(value, size or (1, 1))
         except INVALID:
             corners = NO_CORNERS
-        boxes.append(box_of(label, corners, where, score=item.get("score")))
+        boxes.append(box_of(label, corners, where, score=item.get("score", 1.0)))
     values = [text for text in task["data"].values() if isinstance(text, str)]
     address = str(task["data"].get("image") or next(iter(values), task.get("id", "?")))
     parts = urlsplit(address)

@@ -50,7 +50,8 @@ def _box(shape: dict[str, Any], where: str) -> Box | None:
     if kind not in OUTLINES:
         return None
     corners = bounds(points) if kind != "circle" else _circle(points)
-    return box_of(shape["label"], corners, where, score=shape.get("score"))
+    score = shape.get("score")  # null for what a person drew
+    return box_of(shape["label"], corners, where, score=1.0 if score is None else score)
 
 
 def _circle(points: list[list[float]]) -> Corners:

@@ -87,7 +87,7 @@ def _picture(item: dict[str, Any], source: str) -> AnnotatedPicture:
     )
 
 
-def _label(semantics: Sequence[dict[str, Any]]) -> tuple[str | None, str | None]:
+def _label(semantics: Sequence[dict[str, Any]]) -> tuple[str | None, str]:
     """Return the tag of a class, or else the first tag, and its score."""
     tags: list[tuple[str, str]] = []
     scores: dict[tuple[str, str], str] = {}
@@ -98,9 +98,9 @@ def _label(semantics: Sequence[dict[str, Any]]) -> tuple[str | None, str | None]
         elif not key.endswith("]"):  # a qualifier of another tag
             tags.append((key.removeprefix("osm|"), value))
     if not tags:
-        return None, None
+        return None, "1"
     key, value = next((tag for tag in tags if _is_class("=".join(tag))), tags[0])
-    return f"{key}={value}", scores.get((key, value), scores.get((key, "*")))
+    return f"{key}={value}", scores.get((key, value), scores.get((key, "*"), "1"))
 
 
 def _is_class(tag: str) -> bool:

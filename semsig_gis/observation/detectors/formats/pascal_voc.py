@@ -72,5 +72,5 @@ def _box(item: ET.Element, where: str) -> Box | None:
         return None
     label = (item.findtext("name") or "").strip() or "no label"
     hidden = any((item.findtext(name) or "0").strip() == "1" for name in PARTLY_HIDDEN)
-    score = item.findtext("score") or item.findtext("confidence")
+    score = item.findtext("score", item.findtext("confidence", "1"))
     return box_of(label, corners, where, score=score, whole=not hidden)

@@ -57,7 +57,7 @@ def _picture(name: str, items: Sequence[dict[str, Any]], source: str) -> Annotat
             item.get("name", item.get("label")),
             bounds(points),
             f"{source}, box {number}",
-            score=item.get("confidence", item.get("score")),
+            score=item.get("confidence", item.get("score", 1.0)),
         )
         boxes.append(box)
     # Ultralytics may write shares of the picture.

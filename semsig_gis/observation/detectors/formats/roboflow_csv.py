@@ -43,7 +43,7 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
             _first(row, LABELS),
             [_first(row, names) for names in NAMES],
             f"{document.file}, line {line}",
-            score=_first(row, SCORES),
+            score=_first(row, SCORES) if row.keys() & {*SCORES} else 1.0,
         )
         boxes.setdefault(name, []).append(box)
         shots[name] = Shot(size=size_of(row.get("width"), row.get("height")))

@@ -26,10 +26,15 @@ if TYPE_CHECKING:
 PERCENT = 100.0
 
 
+def _share(item: dict[str, Any]) -> float | None:
+    percent = item.get("Confidence", PERCENT)
+    return None if percent is None else percent / PERCENT
+
+
 def _rekognition(content: dict[str, Any]) -> Items:
     """Return label, box and score of each object; labels of the whole picture have none."""
     return [
-        (label["Name"], item.get("BoundingBox"), item.get("Confidence", PERCENT) / PERCENT)
+        (label["Name"], item.get("BoundingBox"), _share(item))
         for label in content["Labels"]
         for item in label.get("Instances") or []
     ]
@@ -38,14 +43,16 @@ def _rekognition(content: dict[str, Any]) -> Items:
 def _vision(content: dict[str, Any]) -> Items:
     answers = content.get("responses", [content])
     return [
-        (item.get("name"), item.get("boundingPoly"), item.get("score"))
+        (item.get("name"), item.get("boundingPoly"), item.get("score", 1.0))
         for answer in answers
         for item in answer.get("localizedObjectAnnotations") or []
     ]
 
 
 def _roboflow(content: dict[str, Any]) -> Items:
-    return [(item.get("class"), item, item.get("confidence")) for item in content["predictions"]]
+    return [
+        (item.get("class"), item, item.get("confidence", 1.0)) for item in content["predictions"]
+    ]
 
 
 READERS: dict[str, Callable[[dict[str, Any]], Items]] = {

@@ -53,7 +53,7 @@ def _box(item: dict[str, Any], where: str) -> Box | None:
         if isinstance(tag, dict)
     }
     hidden = PARTLY_HIDDEN & tags.keys()
-    score = tags.get("confidence")
+    score = tags.get("confidence", 1.0)
     return box_of(item["classTitle"], corners, where, score=score, whole=not hidden)
 
 

@@ -87,7 +87,7 @@ def _box(words: Sequence[str], labels: Mapping[int, str], where: str) -> Box:
     return box_of(labels[int(number)], corners, where, score=score)
 
 
-def _corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None]:
+def _corners(texts: Sequence[str], where: str) -> tuple[Corners, str]:
     """Return the corners, in shares of the picture, and the score of a box or polygon.
 
     Trackers write the number of the object at the end of the line, after the score.
@@ -101,7 +101,7 @@ def _corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None]:
         raise InputError(
             f"{where} has a value that is not a number; write class, x, y, width, height."
         ) from error
-    score = texts[-1] if len(texts) % 2 else None
+    score = texts[-1] if len(texts) % 2 else "1"
     if len(texts) <= BOX_VALUES + 1:
         x, y, width, height = values[:BOX_VALUES]
         corners = x - width / 2, y - height / 2, x + width / 2, y + height / 2
