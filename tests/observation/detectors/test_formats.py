@@ -708,6 +708,42 @@ def test_boxes_count_as_certain_where_none_has_a_score(tmp_path: Path) -> None:
         assert [(box.score, box.fault) for box in picture.boxes] == [(1.0, "")] * 2
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0 0.2 0.375 0.2 0.25 1.0 7\n1 0.525 0.15 0.05 0.1 0.75 1\n",
+        "0 0.2 0.375 0.2 0.25 7 1.0\n1 0.525 0.15 0.05 0.1 1 0.75\n",
+        "0 0.2 0.375 0.2 0.25 1 1\n1 0.525 0.15 0.05 0.1 0.75 2\n",
+        "0 0.2 0.375 0.2 0.25 3 1\n1 0.525 0.15 0.05 0.1 -1 0.75\n",
+        "0,0.2,0.375,0.2,0.25\n1,0.525,0.15,0.05,0.1,0.75\n",
+        "0, 0.2, 0.375, 0.2, 0.25\n1, 0.525, 0.15, 0.05, 0.1, 0.75\n",
+        "0 0,2 0,375 0,2 0,25\n1 0,525 0,15 0,05 0,1 0,75\n",
+        "0;0,2;0,375;0,2;0,25\n1;0,525;0,15;0,05;0,1;0,75\n",
+        "bench 0.2 0.375 0.2 0.25\nstop sign 0.525 0.15 0.05 0.1 0.75\n",
+        "bench,0.2,0.375,0.2,0.25\nstop sign,0.525,0.15,0.05,0.1,0.75\n",
+    ],
+)
+@pytest.mark.parametrize(
+    ("name", "names"),
+    [
+        ("labels.txt", "bench\nstop sign\n"),
+        ("labels.txt", "0 bench\n1 stop sign\n"),
+        ("obj.data", "classes = 2\nnames = data/obj.names\n"),
+    ],
+)
+def test_forms_of_yolo_give_same_boxes(text: str, name: str, names: str, tmp_path: Path) -> None:
+    (tmp_path / "street.txt").write_text(text)
+    (tmp_path / name).write_text(names)
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "obj.names").write_text("bench\nstop sign\n")
+    for files in ([tmp_path], [tmp_path / "street.txt", tmp_path / name]):
+        (picture,), _ = read_pictures(files)
+        assert [box.label for box in picture.boxes] == LABELS
+        assert [box.score for box in picture.boxes] == SCORES
+        for box_pixels, corners in zip(pixels(picture), CORNERS, strict=True):
+            assert box_pixels == pytest.approx(corners)
+
+
 GOOD, DAMAGED = ("good.json", json.dumps(COCO)), ("damaged.json", json.dumps(COCO)[:50])
 
 
@@ -1035,7 +1071,11 @@ def annotation(**values: object) -> str:
          "not a vector tile"),
         ("a.json", json.dumps({"data": [{"value": "x", "geometry": [[9, 9]]}]}), "unknown size"),
         ("a.txt", "0 0.5 0.5 0.1\n", "line 1 is not a line of YOLO"),
-        ("a.txt", "bench 0.5 0.5 0.1 0.1\n", "line 1 is not a line of YOLO"),
+        ("a.txt", "-1 0.5 0.5 0.1 0.1\n", "line 1 is not a line of YOLO"),
+        ("a.txt", "0 .5 .5 .1 .1 1 0\n", "line 1 ends with 1 0, which may be a score or"),
+        ("a.txt", "0 .5 .5 .1 .1 0\n", "which may be a score or the number"),
+        ("a.txt", "0 .5 .5 .1 .1 7 7\n", "which may be a score or the number"),
+        ("a.txt", "0 .5 .5 .1 .1 1 0.9\n", "which may be a score or the number"),
         ("a.txt", "0 0.5 x 0.1 0.1\n", "line 1 has a value that is not a number"),
         ("a.txt", "0 400 200 10 10\n", "is not in shares of the picture"),
         ("a.txt", "9 0.5 0.5 0.1 0.1\n", "is of class 9, which has no name"),

@@ -57,8 +57,7 @@ def detection_format(
     return register
 
 
-NAME_SUFFIXES = frozenset({".yaml", ".yml", ".names"})
-NAME_FILES = frozenset({"classes.txt"})
+NAME_SUFFIXES = frozenset({".yaml", ".yml", ".names", ".data"})
 
 
 def read_pictures(
@@ -173,7 +172,10 @@ def _files_in(folder: Path) -> list[Path]:
 
 
 def _has_class_names(file: Path) -> bool:
-    return file.suffix.lower() in NAME_SUFFIXES or file.name in NAME_FILES
+    if file.suffix.lower() in NAME_SUFFIXES or file.name == "classes.txt":
+        return True
+    # It may be the labels of a picture of this name.
+    return file.name == "labels.txt" and not any(map(_format, _read([file], {})))
 
 
 def _format(document: Document) -> Format | None:

@@ -15,7 +15,7 @@ from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     bounds,
     box_of,
-    faulty_box,
+    read_boxes,
 )
 from semsig_gis.storage import parse_json
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Box, Corners
 
-NAME_FILES = ("data.yaml", "data.yml", "classes.txt", "obj.names")
+NAME_FILES = ("data.yaml", "data.yml", "classes.txt", "obj.names", "labels.txt", "obj.data")
 """Files with class names, in the folder of the labels or up to two above."""
 LEVELS = 3
 NAME_KEYS = ("names", "id2label", "categories")
@@ -35,6 +35,10 @@ NAME_KEYS = ("names", "id2label", "categories")
 BOX_VALUES = 4
 DOTA_WORDS = 10  # eight numbers, a name and a mark
 NUMBER = re.compile(r"-?\d*\.?\d+(?:[eE][-+]?\d+)?")
+NUMBERED = re.compile(r" *(\d+)[ \t:,]+([^\W\d].*)")
+INTEGER = re.compile(r"-?\d+(?:\.0+)?")
+DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
+MOST_SHARE = 2.0  # a picture away
 LEAST_WORDS = 4  # a line with fewer is of another kind of text
 LEAST_NUMBERS = 3
 
@@ -44,70 +48,142 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
     words = next((line for line in content if line), None)
     if words is None:
         return True
+    own = _words(words)
+    if own != words and not all(_is_share(word) for word in own[1 : BOX_VALUES + 1]):
+        return False  # another table with commas, such as one in pixels
+    words = own
     return (
         len(words) >= LEAST_WORDS
         and not words[0].endswith(":")
         and "." not in words[0].removesuffix(".0")
         and sum(NUMBER.fullmatch(word) is not None for word in words[1:5]) >= LEAST_NUMBERS
-        and NUMBER.fullmatch(words[-1]) is not None
-        and (len(words) != DOTA_WORDS or NUMBER.fullmatch(words[-2]) is not None)
+        and _is_number(words[-1])
+        and (len(words) != DOTA_WORDS or _is_number(words[-2]))
     )
+
+
+def _words(words: Sequence[str]) -> list[str]:
+    """Return the class and the values of a line, which may be separated by commas or semicolons.
+
+    Commas in numbers that are separated by blanks are decimal points. A class may be of several
+    words.
+    """
+    line = " ".join(words)
+    if ";" in line or len(words) > BOX_VALUES:
+        parts = line.split(";") if ";" in line else list(words)
+        texts = [DECIMAL_COMMA.sub(".", part.strip().removesuffix(",")) for part in parts]
+    else:
+        texts = [part.strip() for part in line.split(",")] if "," in line else list(words)
+    number = next((place for place, text in enumerate(texts) if NUMBER.fullmatch(text)), 0)
+    return [" ".join(texts[:number]), *texts[number:]] if number else texts
+
+
+def _is_number(word: str) -> bool:
+    return NUMBER.fullmatch(word) is not None or word.casefold() == "nan"
+
+
+def _is_share(word: str) -> bool:
+    return NUMBER.fullmatch(word) is not None and abs(float(word)) <= MOST_SHARE
 
 
 @detection_format("YOLO with data.yaml", ".txt", matches)
 def pictures(document: Document, documents: Sequence[Document]) -> list[AnnotatedPicture]:
     """Return the picture that is named as the file."""
     file = document.file
-    source = _names_file(file, documents) if any(document.content) else None
+    lines = {
+        number: _words(words) for number, words in enumerate(document.content, start=1) if words
+    }
+    numbered = any(NUMBER.fullmatch(words[0]) for words in lines.values())
+    source = _names_file(file, documents) if numbered else None
     labels = read_class_names(source) if source else {}
     keypoints = _keypoints(source) if source else 0
-    boxes = []
-    for number, words in enumerate(document.content, start=1):
-        if not words:
-            continue
-        try:
-            # Key points stand between the box and its score.
-            own = [*words[: BOX_VALUES + 1], *words[BOX_VALUES + 1 + keypoints :]]
-            boxes.append(_box(own, labels, f"{file}, line {number}"))
-        except InputError as error:
-            boxes.append(faulty_box(str(error).rstrip(".")))
-    return [AnnotatedPicture(name=file.stem, boxes=tuple(boxes), shares=True)]
+    # Key points stand between the box and its score.
+    values = {
+        number: [*words[1 : BOX_VALUES + 1], *words[BOX_VALUES + 1 + keypoints :]]
+        for number, words in lines.items()
+    }
+    orders = {
+        odd: _order([texts for texts in values.values() if len(texts) % 2 == odd]) for odd in (0, 1)
+    }
+
+    def box(number: int, _: str) -> Box:
+        where, texts = f"{file}, line {number}", values[number]
+        label = _label(lines[number], labels, where)
+        corners, score = _corners(texts, orders[len(texts) % 2], where)
+        return box_of(label, corners, where, score=score)
+
+    boxes, _ = read_boxes(lines, box, f"{file}, line")
+    return [AnnotatedPicture(name=file.stem, boxes=boxes, shares=True)]
 
 
-def _box(words: Sequence[str], labels: Mapping[int, str], where: str) -> Box:
-    """Return the box of a line; InputError if it has none."""
+def _label(words: Sequence[str], labels: Mapping[int, str], where: str) -> str:
+    """Return the class of a line; InputError if it has no name, or the line no box."""
     number = words[0].removesuffix(".0")
-    if len(words) <= BOX_VALUES or not number.isdecimal():
+    if len(words) <= BOX_VALUES or number.startswith("-"):
         raise InputError(
             f"{where} is not a line of YOLO labels; write class, x, y, width, height (and score)."
         )
+    if not number.isdecimal():
+        return number
     if int(number) not in labels:
         raise InputError(f"{where} is of class {number}, which has no name; list it in data.yaml.")
-    corners, score = _corners(words[1:], where)
-    return box_of(labels[int(number)], corners, where, score=score)
+    return labels[int(number)]
 
 
-def _corners(texts: Sequence[str], where: str) -> tuple[Corners, str]:
-    """Return the corners, in shares of the picture, and the score of a box or polygon.
+def _order(lines: Sequence[Sequence[str]]) -> str:
+    """Return what the values after the boxes or outlines of lines are: of score and id.
 
-    Trackers write the number of the object at the end of the line, after the score.
+    All lines have an even, or all an odd number of values. Trackers write the number of an object,
+    before or after the score. It is an integer in all lines, and in one at least none of 0 and 1,
+    which scores and coordinates may be. The text is "?" if the order is not known.
     """
-    tracked = len(texts) > BOX_VALUES and texts[-1].isdecimal()
-    if tracked and (int(texts[-1]) > 1 or len(texts) == BOX_VALUES + 2):
-        texts = texts[:-1]
+    lines = [texts for texts in lines if len(texts) > BOX_VALUES]
+    if not lines:
+        return ""
+    before, last = ([texts[place] for texts in lines] for place in (-2, -1))
+    kinds = _kind(before), _kind(last)
+    if len(lines[0]) % 2:
+        return "?" if kinds[1] == "id or score" and "0" in last else kinds[1].split()[-1]
+    if kinds == ("id", "id"):
+        return "?"
+    if "id" in kinds:
+        return "id score" if kinds[0] == "id" else "score id"
+    if any(len(texts) > BOX_VALUES + 2 for texts in lines) or kinds == ("score", "score"):
+        return ""  # outlines
+    return "score id" if kinds[0] == "score" or before == last else "?"
+
+
+def _kind(texts: Sequence[str]) -> str:
+    """Return what the values of a column may be: "id", "score", or "id or score"."""
+    if not all(map(INTEGER.fullmatch, texts)):
+        return "score"
+    return "id or score" if {float(text) for text in texts} <= {0.0, 1.0} else "id"
+
+
+def _corners(texts: Sequence[str], order: str, where: str) -> tuple[Corners, str]:
+    """Return the corners, in shares of the picture, and the score of a box or polygon."""
+    score = "1"
+    if len(texts) > BOX_VALUES:
+        if order == "?":
+            raise InputError(
+                f"{where} ends with {texts[-2]} {texts[-1]}, which may be a score or the number of "
+                "an object; write class, x, y, width, height, score."
+            )
+        names = order.split()
+        ends = dict(zip(names, texts[len(texts) - len(names) :], strict=True))
+        texts, score = texts[: len(texts) - len(names)], ends.get("score", "1")
     try:
         values = [float(text) for text in texts]
     except ValueError as error:
         raise InputError(
             f"{where} has a value that is not a number; write class, x, y, width, height."
         ) from error
-    score = texts[-1] if len(texts) % 2 else "1"
-    if len(texts) <= BOX_VALUES + 1:
-        x, y, width, height = values[:BOX_VALUES]
+    if len(texts) == BOX_VALUES:
+        x, y, width, height = values
         corners = x - width / 2, y - height / 2, x + width / 2, y + height / 2
     else:
-        corners = bounds(zip(values[::2], values[1::2], strict=False))
-    if not all(-1 <= value <= 2 for value in corners):  # noqa: PLR2004 - a picture away
+        corners = bounds(zip(values[::2], values[1::2], strict=True))
+    if not all(-1 <= value <= MOST_SHARE for value in corners):
         raise InputError(
             f"{where} is not in shares of the picture; divide pixels by its width and height."
         )
@@ -141,10 +217,24 @@ def _keypoints(source: Path) -> int:
 
 
 def read_class_names(source: Path) -> dict[int, str]:
-    """Read the names of classes by number: a name in each line, YAML or JSON."""
+    """Read the names of classes by number: a name in each line, YAML or JSON.
+
+    A line may begin with its number. A file of Darknet (.data) has the place of such a file.
+    """
     text = text_of(source)
     suffix = source.suffix.lower()
+    if suffix == ".data":
+        stated = re.search(r"(?m)^ *names *= *(\S+)", text)
+        places = [folder / stated[1] for folder in source.absolute().parents] if stated else []
+        places += [source.with_name(places[0].name)] if places else []
+        names = next((place for place in places if place.is_file()), None)
+        if names is None:
+            raise InputError(f"{source} names no file of class names; give the .names file.")
+        return read_class_names(names)
     if suffix not in {".yaml", ".yml", ".json"}:
+        numbered = [NUMBERED.fullmatch(line) for line in text.splitlines() if line.strip()]
+        if numbered and all(numbered):
+            return {int(match[1]): match[2].strip() for match in numbered if match}
         return dict(enumerate(text.split("\n")))
     try:
         return numbered_names(parse_json(text) if suffix == ".json" else yaml.safe_load(text))
