@@ -293,14 +293,13 @@ class Views:
         if self.detector is None:
             return read_pictures(self.files)
         with reporter.progress("detecting objects") as advance:
-            pictures = detect_boxes(
+            return detect_boxes(
                 self.detector,
                 self.files,
                 names=names,
                 min_score=self.min_score,
                 progress=advance,
             )
-        return pictures, {}
 
 
 def _size(text: str | None) -> tuple[int, int] | None:

@@ -61,13 +61,15 @@ def detect_boxes(
     names: str | Path | None = None,
     min_score: float = 0.3,
     progress: Callable[[int, int], None] | None = None,
-) -> list[AnnotatedPicture]:
+) -> tuple[list[AnnotatedPicture], dict[Path, str]]:
     """Return photographs with the boxes that an object detector in an ONNX file finds in them.
+
+    The second value is why photographs were left out, if others can be read.
 
     `photos` are files or folders. `names` is ``coco`` or a file with the names of the classes; by
     default they are from the model. Boxes with a score below `min_score` are left out. `progress`
-    is called with the number of finished photographs and the total. InputError if the model or a
-    photograph cannot be read, or if the layout of the model's inputs or outputs is unknown.
+    is called with the number of finished photographs and the total. InputError if the model or
+    all photographs cannot be read, or if the layout of the model's inputs or outputs is unknown.
     """
     files: list[Path] = []
     for path in map(Path, photos):
@@ -81,15 +83,22 @@ def detect_boxes(
                 f"the folder {path} contains no photograph; give JPEG, PNG, WebP or TIFF files."
             )
         files += inside
-    shots = [read_exif(file) for file in files]
     detector = Detector.open(Path(model), names)
-    pictures = []
-    for count, (file, shot) in enumerate(zip(files, shots, strict=True), start=1):
-        boxes = detector.boxes(open_upright(file), file.name, min_score=min_score)
-        pictures.append(AnnotatedPicture(name=file.name, boxes=boxes, shot=shot))
+    pictures: list[AnnotatedPicture] = []
+    left_out: dict[Path, str] = {}
+    for count, file in enumerate(files, start=1):
+        try:
+            shot, picture = read_exif(file), open_upright(file)
+        except InputError as error:
+            left_out[file] = str(error)
+        else:
+            boxes = detector.boxes(picture, file.name, min_score=min_score)
+            pictures.append(AnnotatedPicture(name=file.name, boxes=boxes, shot=shot))
         if progress is not None:
             progress(count, len(files))
-    return pictures
+    if left_out and not pictures:
+        raise InputError(next(iter(left_out.values())))
+    return pictures, left_out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

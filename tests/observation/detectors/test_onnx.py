@@ -44,7 +44,7 @@ def check(picture: AnnotatedPicture, labels: tuple[str, str] = ("bench", "fire h
 def test_every_layout_gives_same_boxes(name: str, tmp_path: Path) -> None:
     model = save_detector(tmp_path / "a.onnx", LAYOUTS[name])
     photo = save_photograph(tmp_path / "a.png")
-    (picture,) = detect_boxes(model, [photo], names="coco")
+    (picture,), _ = detect_boxes(model, [photo], names="coco")
     check(picture)
 
 
@@ -121,7 +121,9 @@ OWN = replace(LAYOUTS["yolo_v8"], outputs="float[1, 8, N] output0", numbers=(1, 
 def test_names_of_classes_are_read_from_a_file(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(NAMES[name])
     model = save_detector(tmp_path / "a.onnx", OWN)
-    (picture,) = detect_boxes(model, [save_photograph(tmp_path / "a.png")], names=tmp_path / name)
+    (picture,), _ = detect_boxes(
+        model, [save_photograph(tmp_path / "a.png")], names=tmp_path / name
+    )
     check(picture, ("bench", "litter bin"))
 
 
@@ -135,7 +137,7 @@ def test_names_of_classes_are_read_from_the_model(names: str, tmp_path: Path) ->
     save_photograph(tmp_path / "a.png")
     (tmp_path / "notes.txt").write_text("no photograph")
     finished: list[tuple[int, int]] = []
-    (picture,) = detect_boxes(
+    (picture,), _ = detect_boxes(
         model, [tmp_path], progress=lambda count, total: finished.append((count, total))
     )
     check(picture, ("bench", "litter bin"))
@@ -151,7 +153,7 @@ def test_rf_detr_has_one_more_class_that_it_does_not_use(tmp_path: Path) -> None
         count=5,
     )
     model = save_detector(tmp_path / "a.onnx", layout)
-    (picture,) = detect_boxes(
+    (picture,), _ = detect_boxes(
         model, [save_photograph(tmp_path / "a.png")], names=tmp_path / "a.txt"
     )
     check(picture, ("bench", "litter bin"))
@@ -162,7 +164,7 @@ def test_picture_is_detected_in_its_shown_orientation(tmp_path: Path) -> None:
     exif[Base.Orientation] = 6  # shown after a turn of 90 degrees clockwise
     save_photograph(tmp_path / "a.png", exif, turned=90)
     model = save_detector(tmp_path / "a.onnx", LAYOUTS["yolo_v8"])
-    (picture,) = detect_boxes(model, [tmp_path / "a.png"], names="coco")
+    (picture,), _ = detect_boxes(model, [tmp_path / "a.png"], names="coco")
     check(picture)
 
 
@@ -183,7 +185,7 @@ def test_settings_of_transformers_apply(tmp_path: Path) -> None:
         top=2.1,
     )
     model = save_detector(tmp_path / "onnx/model.onnx", layout)
-    (picture,) = detect_boxes(model, [save_photograph(tmp_path / "a.png")], names="coco")
+    (picture,), _ = detect_boxes(model, [save_photograph(tmp_path / "a.png")], names="coco")
     check(picture)
 
 
@@ -191,7 +193,10 @@ def test_boxes_below_the_score_are_left_out(tmp_path: Path) -> None:
     model = save_detector(tmp_path / "a.onnx", LAYOUTS["yolo_end_to_end"])
     photo = save_photograph(tmp_path / "a.png")
     scores = [
-        [box.score for box in detect_boxes(model, [photo], names="coco", min_score=least)[0].boxes]
+        [
+            box.score
+            for box in detect_boxes(model, [photo], names="coco", min_score=least)[0][0].boxes
+        ]
         for least in (0.0, 0.8, 0.95)
     ]
     assert [len(part) for part in scores] == [3, 1, 0]
@@ -262,6 +267,18 @@ def test_unreadable_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "preprocessor_config.json").write_text("[]")
     with refused(InputError, "preprocessor_config.json is not a table"):
         detect_boxes(model, [save_photograph(photo)], names="coco")
+
+
+def test_unreadable_photograph_does_not_end_the_batch(tmp_path: Path) -> None:
+    model = save_detector(tmp_path / "a.onnx", LAYOUTS["yolo_v8"])
+    content = save_photograph(tmp_path / "a.png").read_bytes()
+    bad = {"0.jpg": b"", "b.png": content[: len(content) // 2], "c.heic": b"x"}
+    for name, part in bad.items():
+        (tmp_path / name).write_bytes(part)
+    (picture,), left_out = detect_boxes(model, [tmp_path], names="coco")
+    check(picture)
+    assert [*left_out] == [tmp_path / name for name in bad]
+    assert all(file.name in reason for file, reason in left_out.items())
 
 
 def test_names_of_coco_are_those_of_its_label_map() -> None:
