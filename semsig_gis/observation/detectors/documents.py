@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
@@ -12,6 +15,7 @@ from semsig_gis.storage import file_rows, parse_json, read_text
 if TYPE_CHECKING:
     from pathlib import Path
 
+DECIMAL_COMMA = re.compile(r"^\s*(-?\d*),(\d+)\s*$")
 INVALID = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError)
 """What reading a document of another form than expected raises."""
 
@@ -65,7 +69,23 @@ def _words(file: Path) -> list[list[str]]:
 
 
 def _rows(file: Path) -> list[tuple[int, Any]]:
-    return list(file_rows(file, what="table of boxes"))
+    rows = list(file_rows(file, what="table of boxes"))
+    header = rows[0][1] if rows else None
+    if not isinstance(header, dict) or ";" not in str(next(iter(header), "")):
+        return rows
+    # Spreadsheets of some languages separate columns by semicolons, and write decimal commas.
+    lines = io.StringIO(text_of(file).removeprefix("\ufeff"), newline="")
+    reader = csv.DictReader(lines, delimiter=";")
+    return [
+        (
+            reader.line_num,
+            {
+                name: DECIMAL_COMMA.sub(r"\1.\2", value) if isinstance(value, str) else value
+                for name, value in row.items()
+            },
+        )
+        for row in reader
+    ]
 
 
 PARSERS = {".csv": _rows, ".json": _json, ".txt": _words, ".xml": _xml}

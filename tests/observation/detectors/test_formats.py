@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import csv
+import io
 import json
 import tempfile
 import zlib
@@ -320,6 +322,11 @@ SMALL_TASK = {
         for item in TASK["predictions"][0]["result"]
     ],
 }
+table = io.StringIO()
+writer = csv.writer(table)
+writer.writerow(["image", "id", "label", "annotator"])
+shapes = [{key: item[key] for key in item if key != "score"} for item in SMALL_TASK["label"][:2]]
+writer.writerow([SMALL_TASK["image"], 3, json.dumps(shapes), 1])
 ROTATED = ("x1", "y1", "x2", "y2", "x3", "y3", "x4", "y4")
 SAMPLES = {
     "COCO": {"street.json": json.dumps(COCO)},
@@ -372,6 +379,19 @@ SAMPLES = {
         "boxes.csv": "image_name,width,height,class_name,x_min,y_min,x_max,y_max\n"
         "street.jpg,800,400,bench,0.1,0.25,0.3,0.5\n"
         "street.jpg,800,400,stop sign,0.5,0.1,0.55,0.2\n"
+    },
+    "CSV of Roboflow (with semicolons)": {
+        "boxes.csv": "\ufeff" + ROBOFLOW.replace(",", ";").replace("80;100", "80,0;100,0")
+    },
+    "CSV of Label Studio": {"tasks.csv": table.getvalue()},
+    "JSON of supervision": {
+        "street.json": json.dumps(
+            [
+                dict(zip(("x_min", "y_min", "x_max", "y_max"), map(float, box), strict=True))
+                | {"class_id": 3, "confidence": score, "tracker_id": "", "class_name": label}
+                for box, label, score in zip(CORNERS, LABELS, SCORES, strict=True)
+            ]
+        )
     },
     "Pascal VOC (outlines)": {
         "street.xml": VOC.replace(
@@ -603,7 +623,7 @@ SAMPLES = {
 }
 # Formats without scores, without sizes, with marks of hidden objects, and with other shapes.
 NO_SCORES = ("Mapillary", "VIA", "CSV")
-NO_SIZES = ("YOLO", "KITTI", "VIA", "results", "answers")
+NO_SIZES = ("JSON", "YOLO", "KITTI", "VIA", "results", "answers")
 WITH_HIDDEN = ("CVAT", "Datumaro", "Pascal", "Supervisely", "KITTI", "BDD100K")
 WITH_OTHERS = ("Label", *WITH_HIDDEN, "VIA", "Panoramax")
 OWN_LABELS = {"KITTI": ["bench", "stop_sign"], "Panor": ["amenity=bench", "traffic_sign=stop"]}
@@ -742,6 +762,33 @@ def test_forms_of_yolo_give_same_boxes(text: str, name: str, names: str, tmp_pat
         assert [box.score for box in picture.boxes] == SCORES
         for box_pixels, corners in zip(pixels(picture), CORNERS, strict=True):
             assert box_pixels == pytest.approx(corners)
+
+
+PREDICTIONS = [
+    {
+        "image_id": "street", "file_name": "street.jpg", "category_id": number,
+        "bbox": item["bbox"], "score": score,
+    }
+    for number, (item, score) in enumerate(zip(COCO["annotations"], SCORES, strict=True))
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_results_of_ultralytics_need_names_and_the_first_number(first: int, tmp_path: Path) -> None:
+    file, names = tmp_path / "predictions.json", tmp_path / "data.yaml"
+    items = [{**item, "category_id": item["category_id"] + first} for item in PREDICTIONS]
+    file.write_text(json.dumps(items))
+    with refused(InputError, "the data.yaml"):
+        read_pictures([file])
+    names.write_text("names: [bench, stop sign]\n")
+    (picture,), _ = read_pictures([file, names])
+    assert [(box.label, box.corners) for box in picture.boxes] == [
+        *zip(LABELS, CORNERS, strict=True)
+    ]
+    names.write_text("names: [car, bench, stop sign, lamp]\n")
+    file.write_text(json.dumps([{**PREDICTIONS[0], "category_id": 1}]))
+    with refused(InputError, "counted from 0 or from 1"):
+        read_pictures([file, names])
 
 
 GOOD, DAMAGED = ("good.json", json.dumps(COCO)), ("damaged.json", json.dumps(COCO)[:50])

@@ -9,6 +9,7 @@ import numpy as np
 
 from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.formats import detection_format
+from semsig_gis.observation.detectors.formats.yolo import read_class_names
 from semsig_gis.observation.detectors.pictures import (
     AnnotatedPicture,
     Shot,
@@ -41,11 +42,40 @@ def pictures(document: Document, documents: Sequence[Document]) -> list[Annotate
             return []
         return _pictures(content, content.get("annotations", []), source)
     if first is None:
+        first = _numbered(content, document, documents)
+    if first is None:
         raise InputError(
             f"{source} contains COCO results without images and categories; give the file of its "
-            "annotations as well, which has them."
+            "annotations as well, which has them, or if Ultralytics wrote it, the data.yaml."
         )
     return _pictures(first, content, source)
+
+
+def _numbered(
+    content: list[dict[str, Any]], document: Document, documents: Sequence[Document]
+) -> dict[str, Any] | None:
+    """Return the pictures and categories of results of Ultralytics by a file of class names.
+
+    None without such a file. Its versions count classes from 0 or from 1: InputError if the numbers
+    do not show which.
+    """
+    source = next((other.file for other in documents if other.content is None), None)
+    if source is None:
+        return None
+    names = read_class_names(source)
+    last = max(number for number, name in names.items() if name)
+    used = {int(item["category_id"]) for item in content}
+    if 0 not in used and last + 1 not in used:
+        raise InputError(
+            f"{document.file} has classes that may be counted from 0 or from 1, as neither 0 nor "
+            f"{last + 1} is one of them; give the file of annotations with images and categories."
+        )
+    first = 0 if 0 in used else 1
+    pictures = {item["image_id"]: item.get("file_name", item["image_id"]) for item in content}
+    return {
+        "images": [{"id": key, "file_name": str(name)} for key, name in pictures.items()],
+        "categories": [{"id": number + first, "name": name} for number, name in names.items()],
+    }
 
 
 def _is_coco(content: Any) -> bool:  # noqa: ANN401 - any JSON

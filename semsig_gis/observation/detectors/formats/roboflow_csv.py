@@ -5,7 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.observation.detectors.formats import detection_format
-from semsig_gis.observation.detectors.pictures import AnnotatedPicture, Shot, box_of, size_of
+from semsig_gis.observation.detectors.pictures import (
+    AnnotatedPicture,
+    Shot,
+    box_of,
+    faulty_box,
+    size_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,9 +40,13 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
     """Return the picture of each file name; without names, the one that is named as the file."""
     boxes: dict[str, list[Box]] = {}
     shots: dict[str, Shot] = {}
+    name = document.file.stem
     for line, cells in document.content:
-        if isinstance(cells, Exception):
-            raise cells
+        if not isinstance(cells, dict):
+            boxes.setdefault(name, []).append(
+                faulty_box(f"{document.file}, line {line} is no row of a table")
+            )
+            continue
         row = _lower(cells)
         name = _first(row, PICTURES) or document.file.stem
         box = box_of(
@@ -50,7 +60,7 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
     corners = [side for items in boxes.values() for box in items for side in box.corners]
     shares = max(corners) <= 1 and any(side % 1 for side in corners)
     return [
-        AnnotatedPicture(name=name, boxes=tuple(items), shares=shares, shot=shots[name])
+        AnnotatedPicture(name=name, boxes=tuple(items), shares=shares, shot=shots.get(name, Shot()))
         for name, items in boxes.items()
     ]
 
