@@ -31,7 +31,9 @@ MOST_SHOWN = 40
 DIGITS_FIRST = re.compile(r"[^\W\d_]?\W*\d")
 QUOTED = re.compile(r'["{}=]|\(-?\d|\d\)')  # not in names
 # Values that are no names: a number with decimals, an angle, and a long whole number.
-NO_NAME = re.compile(r"\s*[+-]?\d+(?:[.,]\d+)(?:\D.*)?|\s*\d+\s*[°º].*|\s*\d{5,}\s*", re.DOTALL)
+NO_NAME = re.compile(
+    r"\s*[+-]?\d+(?:[.,]\d+)(?:\D.*)?|\s*\d+\s*[°º].*|\s*\d{5,}\s*|\s*\d+[;\t|][\d;].*", re.DOTALL
+)
 # A geometry may be longer than the 128 KiB that Python's reader allows by default.
 MOST_VALUE_CHARACTERS = 2**24
 READ_BYTES = 2**20
@@ -215,8 +217,12 @@ def _layout(lines: Sequence[str], separator: str, first: int, *, titles: bool = 
     if names[0].lstrip().startswith("#") and len(names) > 1:  # a comment for some programs
         first_name = names[0].strip().removeprefix("#")
         names = [first_name, *names[1:]] if first_name else names[1:]
-    others = [len(_trimmed(row)) for number, row in rows if number > start]
-    same = sum(size == len(_trimmed(names)) for size in others)
+    others = [row for number, row in rows if number > start]
+    # Last values may be blank in every row, but not last names.
+    named = len(_trimmed(names))
+    same = sum(
+        named in {len(_trimmed(row)), len(row) if named == len(names) else 0} for row in others
+    )
     need = (len(others) + bad) / (1 if blanks else 2)
     fits = len(names) > 1 and same >= need
     return _Layout(separator, start, tuple(name.strip() for name in names), fits)

@@ -10,6 +10,8 @@ GROUPED = {
     mark: re.compile(rf"[+-]?\d{{1,3}}(?:[{mark}]\d{{3}})+(?=$|[^\d{mark}])")
     for mark in (THOUSANDS_MARKS, ".", ",")
 }
+# Spreadsheets keep numbers as text with ="45.7" and '45.7.
+KEPT_AS_TEXT = re.compile(r"^(?:=\"|')(.*?)\"?$")
 # In a file with commas between columns, "1,234" may be a decimal or a thousand.
 THOUSANDS_OR_NOT = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 
@@ -20,7 +22,7 @@ def decimal(text: str, *, english: bool = False) -> float:
     A single comma is a decimal comma. With `english`, ``1,234`` is ambiguous. ValueError for an
     ambiguous text or one that is not a number.
     """
-    plain = text.strip().replace("\N{MINUS SIGN}", "-")
+    plain = KEPT_AS_TEXT.sub(r"\1", text.strip()).replace("\N{MINUS SIGN}", "-")
     if GROUPED[THOUSANDS_MARKS].match(plain):
         plain = re.sub(f"[{THOUSANDS_MARKS}]", "", plain)
     commas, points = plain.count(","), plain.count(".")

@@ -79,9 +79,19 @@ SEPARATORS = tuple(
         ),
     )
 )
+# Fewer decimals are those of measurements.
+MANY_DECIMALS = re.compile(r"\d[.,]\d{4}")
 HALF_TURN, SIXTY = 180.0, 60.0
 FLOAT = r"[+-]?\d+(?:\.\d*)?(?:e[+-]?\d+)?"
 TWO_NUMBERS = re.compile(rf"({FLOAT})\s*[,;\s]\s*({FLOAT})")
+# A pair with a height, and perhaps its accuracy.
+WITH_HEIGHT = re.compile(
+    r"^([+-]?\d+\.\d{4,}[\s,;]+[+-]?\d+\.\d{4,})(?:[\s,;]+[+-]?\d+(?:\.\d+)?){1,2}$"
+)
+# A point as Java prints a map.
+JAVA_POINT = re.compile(
+    rf"\{{.*\bcoordinates\s*=\s*\[+\s*({NUMBER})\s*,\s*({NUMBER})[^\[]*\]+.*\}}", re.DOTALL
+)
 LATITUDE, LONGITUDE = "lat", "lon"
 
 
@@ -149,6 +159,12 @@ def is_angle(value: object) -> bool:
         return _angle(value).marked
     except (TypeError, ValueError):
         return False
+
+
+def is_negative(value: object, *, o_is_east: bool = False) -> bool:
+    """Whether a value is the name or the letter of the southern or western hemisphere."""
+    kind = _letters().get(plain_letters(value).strip()) if isinstance(value, str) else None
+    return kind is not None and (kind[1] < 0 or (kind[1] == 0 and not o_is_east))
 
 
 def axis_of(value: object) -> str:
@@ -250,17 +266,23 @@ def _of_text(text: str, order: AxisOrder | None, *, o_is_east: bool) -> Located 
         return Located((float(uri[2]), float(uri[1])), pair=True, order="lat_lon")
     if link := MAP_LINK.fullmatch(text):
         return Located((float(link[2]), float(link[1])), pair=True, order="lat_lon")
-    if text.startswith(("{", "[")):
-        try:
-            content = parse_json(text)
-        except ValueError:
-            try:
-                content = ast.literal_eval(text)  # as Python prints it
-            except (SyntaxError, ValueError, MemoryError, RecursionError):
-                content = None
-        if isinstance(content, dict | list):
-            return locate(content, order)
+    if text.startswith(("{", "[")) and (content := _content(text)) is not None:
+        return locate(content, order)
     return _of_pair(text, order, o_is_east=o_is_east)
+
+
+def _content(text: str) -> dict[str, Any] | list[Any] | None:
+    """Return what a text holds as JSON, or as Python or Java print it, or None."""
+    if point := JAVA_POINT.fullmatch(text):
+        return {"type": "Point", "coordinates": [float(point[1]), float(point[2])]}
+    try:
+        content = parse_json(text)
+    except ValueError:
+        try:
+            content = ast.literal_eval(text)
+        except (SyntaxError, ValueError, MemoryError, RecursionError):
+            return None
+    return content if isinstance(content, dict | list) else None
 
 
 def _of_pair(text: str, order: AxisOrder | None, *, o_is_east: bool) -> Located:
@@ -271,7 +293,7 @@ def _of_pair(text: str, order: AxisOrder | None, *, o_is_east: bool) -> Located:
     inner = text.strip("()[]{} \t\r\n")
     if "\n" in inner:
         inner = inner.splitlines()[-1].strip() or inner
-    inner = inner.casefold()
+    inner = WITH_HEIGHT.sub(r"\1", inner).casefold()
     tokens = inner.split()
     if len(tokens) == 6 and all(token.replace(".", "").isdecimal() for token in tokens):  # noqa: PLR2004 - two angles
         inner = f"{' '.join(tokens[:3])}; {' '.join(tokens[3:])}"
@@ -348,7 +370,8 @@ def _of_members(value: Mapping[str, Any], order: AxisOrder | None) -> Located | 
         xy = coordinate(axes[LONGITUDE]), coordinate(axes[LATITUDE])
         return Located(xy, pair=True, order="lat_lon")
     for member in value.values():
-        if isinstance(member, dict | list | tuple) and member:
+        pair = isinstance(member, str) and len(MANY_DECIMALS.findall(member)) > 1
+        if pair or (isinstance(member, dict | list | tuple) and member):
             try:
                 return locate(member, order)
             except BadFeatureError:

@@ -30,10 +30,12 @@ from semsig_gis.sources.position_names import (
 from semsig_gis.sources.position_values import (
     LATITUDE,
     LONGITUDE,
+    MANY_DECIMALS,
     Located,
     axis_of,
     coordinate,
     is_angle,
+    is_negative,
     locate,
     position_words,
     shown,
@@ -65,10 +67,10 @@ FIRST_VALUES, PLACES = 20, 15
 NEAR_TOWN_KM = 50.0
 # Objects of a city are in it, and others seldom are that far from one.
 IN_TOWN_KM, FAR_FROM_TOWN_KM = 10.0, 15.0
-# Fewer decimals are those of measurements.
-MANY_DECIMALS = re.compile(r"\d[.,]\d{4}")
 FEW_DECIMALS = re.compile(r"\d[.,]\d")
 LONG_NUMBERS = re.compile(r"\d{5}")
+# What the name of a field of hemispheres has after that of the coordinates.
+LETTER_WORDS = {"dir", "direction", "hemi", "hemisphere", "ref", "ns", "n_s", "ew", "e_w"}
 # In a plane, coordinates of a national grid are thousands of metres.
 MIN_PLANE = 1_000.0
 # Positions of two fields that differ by more belong to different things: degrees, metres.
@@ -81,8 +83,9 @@ class PositionFields:
 
     `order` is that of a pair in `field` which does not show its own; with `turned`, geometries in
     it have latitude first. `english` is whether a comma
-    may separate thousands, `o_is_east` whether the letter O means east (German). `crs` is the one
-    that the coordinates suggest. What a person has to check is in `questions`; without `sure`, the
+    may separate thousands, `o_is_east` whether the letter O means east (German). `letters` are
+    the fields with the hemispheres of `x` and `y` without sign. `crs` is the one that the
+    coordinates suggest. What a person has to check is in `questions`; without `sure`, the
     names of the fields do not say that they are positions.
     """
 
@@ -93,6 +96,7 @@ class PositionFields:
     turned: bool = False
     english: bool = False
     o_is_east: bool = False
+    letters: tuple[str | None, str | None] = (None, None)
     crs: str | None = None
     sure: bool = True
     questions: tuple[str, ...] = ()
@@ -106,7 +110,7 @@ class PositionFields:
     def exchanged(self) -> PositionFields:
         """The same fields with x as y."""
         if self.field is None:
-            return replace(self, x=self.y, y=self.x)
+            return replace(self, x=self.y, y=self.x, letters=self.letters[::-1])
         order = LON_LAT if self.order == LAT_LON else LAT_LON
         return replace(self, order=order, turned=order == LAT_LON)
 
@@ -135,7 +139,13 @@ class PositionFields:
                 text = "" if value is None else value.strip() if isinstance(value, str) else value
                 raise BadFeatureError(f"{name} {shown(text)} is not a number")
             numbers.append(number)
-        return Located((numbers[0], numbers[1]))
+        return Located((self._signed(numbers[0], values, 0), self._signed(numbers[1], values, 1)))
+
+    def _signed(self, number: float, values: Row, axis: int) -> float:
+        """Return a coordinate with the sign of its hemisphere, which may be in another field."""
+        letter = self.letters[axis]
+        negative = letter and is_negative(values.get(letter), o_is_east=self.o_is_east)
+        return -abs(number) if negative else number
 
 
 def _is_blank(value: object) -> bool:
@@ -192,7 +202,23 @@ def stated_fields(spec: LayerSpec, fields: Sequence[str], *, where: str) -> Posi
         )
     require_field(spec.x_field, fields, where=where, key="x_field")
     require_field(spec.y_field, fields, where=where, key="y_field")
-    return PositionFields(x=spec.x_field, y=spec.y_field, o_is_east=o_is_east_in(fields))
+    stated = PositionFields(x=spec.x_field, y=spec.y_field, o_is_east=o_is_east_in(fields))
+    return _with_letters(stated, fields)
+
+
+def _with_letters(choice: PositionFields, fields: Sequence[str]) -> PositionFields:
+    """Return fields of coordinates with those of their hemispheres, such as lon and lon_dir."""
+    x, y = (
+        next((field for field in fields if _is_letter_of(str(name), field)), None)
+        for name in (choice.x, choice.y)
+    )
+    return replace(choice, letters=(x, y))
+
+
+def _is_letter_of(name: str, field: str) -> bool:
+    """Whether a field is named as the hemisphere of another, as GPSLatitudeRef is."""
+    own, other = name.casefold(), field.casefold()
+    return other.startswith(own) and other[len(own) :].strip("_- .") in LETTER_WORDS
 
 
 def no_positions(fields: Sequence[str]) -> str:
@@ -264,6 +290,8 @@ def find_positions(
         return None
     best, *others = candidates
     choice = _oriented(best)
+    if choice.field is None:
+        choice = _with_letters(choice, fields)
     return replace(choice, questions=(*choice.questions, *_other_places(best, others)))
 
 

@@ -75,6 +75,8 @@ def sexagesimal(value: float, letters: str, style: str) -> str:
 
 
 ANGLES: dict[str, Callable[[float, str], str]] = {
+    "formula": lambda value, _: f'="{value:.7f}"',
+    "kept as text": lambda value, _: f"'{value:.7f}",
     "point": lambda value, _: f"{value:.7f}",
     "comma": lambda value, _: f"{value:.7f}".replace(".", ","),
     "sign": lambda value, _: f"{value:+.7f}",
@@ -98,6 +100,8 @@ WHOLES: dict[str, Callable[[float, float], str]] = {
     "json": lambda x, y: json.dumps({"latitude": y, "longitude": x}),
     "python": lambda x, y: repr({"lat": str(y), "lng": str(x), "address": '{"zip": 1}'}),
     "uri": lambda x, y: f"geo:{y:.7f},{x:.7f}",
+    "java": lambda x, y: f"{{coordinates=[{x:.7f}, {y:.7f}], type=Point}}",
+    "heights": lambda x, y: f"{y:.7f} {x:.7f} 171.2 4.5",
     "list": lambda x, y: f"[{x:.7f}, {y:.7f}]",
     "parentheses": lambda x, y: f"({y:.7f}, {x:.7f})",
     "lat, lon": lambda x, y: f"{y:.7f}, {x:.7f}",
@@ -211,6 +215,37 @@ def test_draft_asks_where_another_reading_is_possible(names: str, tmp_path: Path
     assert all(word in question for word in words)
     assert "# Its positions are near Lyon, France." in text
     assert farthest(read(file, text), PLACES) < 0.01
+
+
+WEST = [(-x, y) for x, y in PLACES]
+
+
+@pytest.mark.parametrize(
+    ("content", "row", "places"),
+    [
+        (
+            "id;lat;lat_dir;lon;lon_dir",
+            lambda x, y: f"1;{y};N;{abs(x)};{'EW'[x < 0]}",
+            WEST,
+        ),
+        (
+            "GPSLatitude;GPSLatitudeRef;GPSLongitude;GPSLongitudeRef",
+            lambda x, y: f"{y};North;{abs(x)};West",
+            WEST,
+        ),
+        (
+            "Lights 2024;;;\n;;;\nid;lat;lon;note",
+            lambda x, y: f"1;{y};{x};".replace(".", ","),
+            PLACES,
+        ),
+    ],
+)
+def test_tables_of_spreadsheets_and_cameras_are_read(
+    content: str, row: Callable[[float, float], str], places: list[Pair], tmp_path: Path
+) -> None:
+    file = tmp_path / "street_lights.csv"
+    file.write_text("\n".join([content, *(row(*place) for place in places)]))
+    assert farthest(read(file, draft_catalog(file)), places) < 0.01
 
 
 @pytest.mark.parametrize("names", ["E;N", "Y_Koord;X_Koord", "Ostwert;Nordwert", "x;y", "a;b"])

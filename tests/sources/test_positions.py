@@ -41,6 +41,8 @@ VALUES: list[object] = [
     {"type": "Point", "coordinates": ["4.5", "45.75"]},
     {"type": "Feature", "geometry": {"type": "Point", "coordinates": [4.5, 45.75]}},
     "{'latitude': '45.75', 'longitude': '4.5', 'address': '{\"zip\": 1}'}",
+    *("45.7500 4.5000 170.5 3.0", {"location": "45.7500,4.5000"}),
+    *("{coordinates=[4.5, 45.75], type=Point}", '="45.75" ="4.5"'),
 ]
 NO_PLACES = ["nowhere", "12-14", "2024-05-01", "04 72 10 30 30", "45.763.1", "95°70'", "5 Main St"]
 
