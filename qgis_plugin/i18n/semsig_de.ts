@@ -392,8 +392,8 @@
         <translation>Detektionen bekannter Orte: eine Datei von Ansichten als CSV oder JSON-Zeilen mit x und y (Meter) oder cell_id (ihrer Mitte).</translation>
     </message>
     <message>
-        <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, Datumaro, BDD100K, Mapillary, Panoramax, Ultralytics or Transformers JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: photographs, or folders of them.</source>
-        <translation>Detektionen: COCO, Label Studio, LabelMe, VIA, Supervisely, Datumaro, BDD100K, Mapillary, Panoramax, Ultralytics oder Transformers JSON, CVAT oder Pascal VOC XML, YOLO .txt mit data.yaml, KITTI .txt, CSV von Roboflow; oder ein Ordner. Mit --detector: Fotos oder Ordner mit Fotos.</translation>
+        <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, Darwin, Datumaro, BDD100K, Mapillary, Panoramax, Ultralytics, Transformers or supervision JSON, answers of Rekognition, Vision or Roboflow, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow or Label Studio; or a folder. With --detector: photographs, or folders of them.</source>
+        <translation>Detektionen: COCO, Label Studio, LabelMe, VIA, Supervisely, Darwin, Datumaro, BDD100K, Mapillary, Panoramax, Ultralytics, Transformers oder supervision JSON, Antworten von Rekognition, Vision oder Roboflow, CVAT oder Pascal VOC XML, YOLO .txt mit data.yaml, KITTI .txt, CSV von Roboflow oder Label Studio; oder ein Ordner. Mit --detector: Fotos oder Ordner mit Fotos.</translation>
     </message>
     <message>
         <source>Direction of the camera, clockwise from north.</source>

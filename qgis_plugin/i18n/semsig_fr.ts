@@ -392,8 +392,8 @@
         <translation>Détections de lieux connus : un fichier de vues en CSV ou JSON par lignes avec x et y (mètres) ou cell_id (son centre).</translation>
     </message>
     <message>
-        <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, Datumaro, BDD100K, Mapillary, Panoramax, Ultralytics or Transformers JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: photographs, or folders of them.</source>
-        <translation>Détections : JSON de COCO, Label Studio, LabelMe, VIA, Supervisely, Datumaro, BDD100K, Mapillary, Panoramax, Ultralytics ou Transformers, XML de CVAT ou Pascal VOC, .txt de YOLO avec data.yaml, .txt de KITTI, CSV de Roboflow ; ou un dossier. Avec --detector : des photos, ou des dossiers de photos.</translation>
+        <source>Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, Darwin, Datumaro, BDD100K, Mapillary, Panoramax, Ultralytics, Transformers or supervision JSON, answers of Rekognition, Vision or Roboflow, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of Roboflow or Label Studio; or a folder. With --detector: photographs, or folders of them.</source>
+        <translation>Détections : JSON de COCO, Label Studio, LabelMe, VIA, Supervisely, Darwin, Datumaro, BDD100K, Mapillary, Panoramax, Ultralytics, Transformers ou supervision, réponses de Rekognition, Vision ou Roboflow, XML de CVAT ou Pascal VOC, .txt de YOLO avec data.yaml, .txt de KITTI, CSV de Roboflow ou de Label Studio ; ou un dossier. Avec --detector : des photos, ou des dossiers de photos.</translation>
     </message>
     <message>
         <source>Direction of the camera, clockwise from north.</source>

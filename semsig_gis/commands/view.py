@@ -74,9 +74,10 @@ class Views:
     files: Annotated[
         list[Path],
         Option(
-            "Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, Datumaro, BDD100K, "
-            "Mapillary, Panoramax, Ultralytics or Transformers JSON, CVAT or Pascal VOC XML, YOLO "
-            ".txt with data.yaml, KITTI .txt, CSV of Roboflow; or a folder. With --detector: "
+            "Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, Darwin, Datumaro, BDD100K, "
+            "Mapillary, Panoramax, Ultralytics, Transformers or supervision JSON, answers of "
+            "Rekognition, Vision or Roboflow, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, "
+            "KITTI .txt, CSV of Roboflow or Label Studio; or a folder. With --detector: "
             "photographs, or folders of them.",
             positional=True,
             reads=True,

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from PIL import Image
 
     from semsig_gis.observation.detectors.layouts import ClassNames
-    from semsig_gis.observation.detectors.pictures import Box
+    from semsig_gis.observation.detectors.pictures import Box, Shot
 
 KINDS = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 PICTURES = 4
@@ -71,6 +71,35 @@ def detect_boxes(
     is called with the number of finished photographs and the total. InputError if the model or
     all photographs cannot be read, or if the layout of the model's inputs or outputs is unknown.
     """
+    files = _photographs(photos)
+    shots: dict[Path, Shot] = {}
+    left_out: dict[Path, str] = {}
+    for file in files:
+        try:
+            shots[file] = read_exif(file)
+        except InputError as error:
+            left_out[file] = str(error)
+            if len(left_out) == len(files):
+                raise
+    detector = Detector.open(Path(model), names)
+    pictures = []
+    for count, (file, shot) in enumerate(shots.items(), start=1):
+        try:
+            picture = open_upright(file)
+        except InputError as error:
+            left_out[file] = str(error)
+            if len(left_out) == len(files):
+                raise
+        else:
+            boxes = detector.boxes(picture, file.name, min_score=min_score)
+            pictures.append(AnnotatedPicture(name=file.name, boxes=boxes, shot=shot))
+        if progress is not None:
+            progress(count, len(shots))
+    return pictures, left_out
+
+
+def _photographs(photos: Iterable[str | Path]) -> list[Path]:
+    """Return photographs, and those in folders, each once; InputError if a folder has none."""
     files: list[Path] = []
     for path in map(Path, photos):
         inside = [path]
@@ -83,22 +112,7 @@ def detect_boxes(
                 f"the folder {path} contains no photograph; give JPEG, PNG, WebP or TIFF files."
             )
         files += inside
-    detector = Detector.open(Path(model), names)
-    pictures: list[AnnotatedPicture] = []
-    left_out: dict[Path, str] = {}
-    for count, file in enumerate(files, start=1):
-        try:
-            shot, picture = read_exif(file), open_upright(file)
-        except InputError as error:
-            left_out[file] = str(error)
-        else:
-            boxes = detector.boxes(picture, file.name, min_score=min_score)
-            pictures.append(AnnotatedPicture(name=file.name, boxes=boxes, shot=shot))
-        if progress is not None:
-            progress(count, len(files))
-    if left_out and not pictures:
-        raise InputError(next(iter(left_out.values())))
-    return pictures, left_out
+    return list(dict.fromkeys(files))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
