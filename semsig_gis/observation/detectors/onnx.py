@@ -20,8 +20,8 @@ from semsig_gis.observation.detectors.layouts import (
     read_outputs,
     suppress_overlaps,
 )
+from semsig_gis.observation.detectors.picture_files import PICTURE_SUFFIXES
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, box_of
-from semsig_gis.observation.detectors.views import PICTURE_SUFFIXES
 from semsig_gis.storage import parse_json, read_text
 
 if TYPE_CHECKING:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import unicodedata
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
@@ -18,12 +17,12 @@ from semsig_gis.core import (
     InputError,
     Taxonomy,
     UnknownNameError,
-    nearest_name,
     require_number,
     wrap_degrees,
 )
 from semsig_gis.observation.detectors.camera import USUAL_FOV, Camera, Projection
 from semsig_gis.observation.detectors.exif import PANORAMAS, read_exif
+from semsig_gis.observation.detectors.picture_files import PictureFiles
 from semsig_gis.observation.detectors.pictures import ROBOFLOW, Shot, same_shape, upright
 from semsig_gis.observation.view import (
     CLASSES,
@@ -51,11 +50,6 @@ Places = Literal["each", "gps", "all"]
 
 SAME_PLACE_M = 5.0
 METRES_PER_DEGREE = 111_320.0
-PICTURE_SUFFIXES = (
-    *(".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff"),
-    *(".heic", ".heif", ".avif", ".mpo"),
-)
-
 # A box this near to the edge of the picture is cut off: pixels, and share of the side.
 EDGE_PIXELS, EDGE_SHARE = 1.0, 0.002
 EDGE_ERROR_PIXELS = 1.0
@@ -166,9 +160,11 @@ class ViewBuilder:
     shot: Shot = field(default_factory=Shot)
     shots: Mapping[str, Shot] = field(default_factory=dict)
     folders: Sequence[Path] | None = ()
-    _listings: dict[tuple[Path, bool], dict[str, list[Path]]] = field(
-        default_factory=dict, init=False, repr=False
-    )
+    _files: PictureFiles = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Prepare the search for the files of pictures."""
+        object.__setattr__(self, "_files", PictureFiles(self.folders))
 
     def views(
         self, pictures: Iterable[AnnotatedPicture], *, places: Places = "each"
@@ -239,7 +235,7 @@ class ViewBuilder:
         if own.heading_error is None:
             own = replace(own, heading_error=self.shot.heading_error)
         shot = own.filled(replace(self.shot, size=None)).filled(picture.shot)
-        if files := self._files(picture):
+        if files := self._files.find(picture):
             file = files[0]
             if len(files) > 1:
                 tally.several[picture.name] = files[0]
@@ -268,60 +264,11 @@ class ViewBuilder:
             shot = shot.filled(replace(exif, turn=None))
         return shot.filled(Shot(size=self.shot.size))
 
-    def _files(self, picture: AnnotatedPicture) -> list[Path]:
-        """Return the files that may be of a picture, best first, without regard to case and kind.
-
-        InputError if folders in that of the pictures have several.
-        """
-        for folder in picture.folders if self.folders is None else self.folders:
-            for path in (folder / name for name in picture.names):
-                if path.is_file():
-                    return [path]
-                if files := self._listing(path.parent).get(_key(path.name)):
-                    return files
-            for name in picture.names if self.folders else ():
-                files = self._listing(folder, deep=True).get(_key(name), [])
-                if len(files) > 1:
-                    raise InputError(
-                        f"{picture.name} may be {files[0]} or {files[1]}; give the folder of the "
-                        "right one as --images."
-                    )
-                if files:
-                    return files
-        return []
-
-    def _listing(self, folder: Path, *, deep: bool = False) -> dict[str, list[Path]]:
-        """Return the pictures of a folder by name, with and without suffix, without case.
-
-        With `deep`, those of folders in it as well.
-        """
-        if (folder, deep) not in self._listings:
-            listing: dict[str, list[Path]] = {}
-            files = folder.rglob("*") if deep else folder.iterdir() if folder.is_dir() else ()
-            pictures = [file for file in files if file.suffix.lower() in PICTURE_SUFFIXES]
-            pictures.sort(key=lambda file: (PICTURE_SUFFIXES.index(file.suffix.lower()), file))
-            for file in pictures:
-                listing.setdefault(_key(file.name), []).append(file)
-            for file in pictures:
-                listing.setdefault(_key(file.stem), []).append(file)
-            self._listings[folder, deep] = listing
-        return self._listings[folder, deep]
-
-    def _searched(self, picture: AnnotatedPicture) -> str:
-        """Return a note for messages on the folder where the file of a picture is missing."""
-        folders = picture.folders if self.folders is None else self.folders
-        if not folders or self._files(picture):
-            return ""
-        listing = self._listing(folders[0], deep=bool(self.folders))
-        names = {file.name for files in listing.values() for file in files}
-        nearest = nearest_name(PurePosixPath(picture.name.replace("\\", "/")).name, sorted(names))
-        return f" ({picture.name} is not in {folders[0]}{nearest})"
-
     def _camera(self, picture: AnnotatedPicture, shot: Shot) -> Camera:
         if shot.size is None:
             raise InputError(
                 f"the size of the picture {picture.name} is not known; give the folder of the "
-                f"pictures with --images, or --size WIDTHxHEIGHT{self._searched(picture)}."
+                f"pictures with --images, or --size WIDTHxHEIGHT{self._files.searched(picture)}."
             )
         width, height = shot.size
         fov = field_of_view(shot)
@@ -329,7 +276,7 @@ class ViewBuilder:
             raise InputError(
                 f"the field of view of the picture {picture.name} is not known; give --fov in "
                 "degrees, or with --images the folder of the pictures with their EXIF"
-                f"{self._searched(picture)}."
+                f"{self._files.searched(picture)}."
             )
         return Camera(
             width=width,
@@ -569,11 +516,6 @@ def _require_objects(tally: Tally) -> None:
             f"none of the {tally.no_boxes:,} shapes is a box or an outline of one object, only "
             "points, lines or groups; mark each object with a box or an outline."
         )
-
-
-def _key(name: str) -> str:
-    """Return a name of a file for comparison, without case and forms of accents."""
-    return unicodedata.normalize("NFC", name).casefold()
 
 
 def _metres(first: tuple[float, float], second: tuple[float, float]) -> float:
