@@ -71,11 +71,15 @@ def _words(file: Path) -> list[list[str]]:
 def _rows(file: Path) -> list[tuple[int, Any]]:
     rows = list(file_rows(file, what="table of boxes"))
     header = rows[0][1] if rows else None
-    if not isinstance(header, dict) or ";" not in str(next(iter(header), "")):
+    first = str(next(iter(header), "")) if isinstance(header, dict) else ""
+    separator = next((mark for mark in (";", "\t") if mark in first), None)
+    if separator is None:
         return rows
-    # Spreadsheets of some languages separate columns by semicolons, and write decimal commas.
+    # Spreadsheets of some languages have semicolons or tabs between columns, and decimal commas.
     lines = io.StringIO(text_of(file).removeprefix("\ufeff"), newline="")
-    reader = csv.DictReader(lines, delimiter=";")
+    if first.startswith("sep="):
+        next(lines)
+    reader = csv.DictReader(lines, delimiter=separator)
     return [
         (
             reader.line_num,

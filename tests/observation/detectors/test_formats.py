@@ -383,6 +383,10 @@ SAMPLES = {
     "CSV of Roboflow (with semicolons)": {
         "boxes.csv": "\ufeff" + ROBOFLOW.replace(",", ";").replace("80;100", "80,0;100,0")
     },
+    "CSV of Roboflow (with tabs)": {
+        "boxes.csv": ROBOFLOW.replace(",", "\t").replace("240", "240,0")
+    },
+    "CSV of Roboflow (of spreadsheets)": {"boxes.csv": "sep=;\n" + ROBOFLOW.replace(",", ";")},
     "CSV of Label Studio": {"tasks.csv": table.getvalue()},
     "JSON of supervision": {
         "street.json": json.dumps(
@@ -685,6 +689,7 @@ def test_every_format_gives_same_boxes(form: str, tmp_path: Path) -> None:
         ("CVAT for images", 'label="bench" ', ""),
         ("Datumaro", '"label_id": 0, ', ""),
         ("KITTI label_2", "bench 0.00", "bench x"),
+        ("Label Studio", '"width": 20, ', ""),
     ],
 )
 def test_one_shape_that_cannot_be_read_is_one_fault(
@@ -1111,7 +1116,8 @@ def annotation(**values: object) -> str:
         ("a.json", changed(images=[{"id": 7}, 3]), "does not follow its format"),
         ("a.json", changed(annotations=[{}]), "lacks 'image_id'"),
         ("a.json", changed(categories=[{"id": 1}]), "lacks 'name'"),
-        ("a.json", json.dumps([{"data": {}, "annotations": [{"result": [3]}]}]), "not follow its"),
+        ("a.json", json.dumps([{"data": {}, "annotations": [{"result": [3]}]}]),
+         "result 1 has a box or a score"),
         ("a.json", json.dumps({**IMAGE, "detections": [{"value": "x", "geometry": "?"}]}),
          "image street, detection 1 has a geometry that is not a vector tile"),
         ("a.json", json.dumps({**IMAGE, "detections": [{"value": "x", "geometry": "Gv8="}]}),

@@ -7,14 +7,13 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from semsig_gis.observation.detectors.documents import INVALID
 from semsig_gis.observation.detectors.formats import detection_format
 from semsig_gis.observation.detectors.pictures import (
-    NO_CORNERS,
     AnnotatedPicture,
     Shot,
     bounds,
     box_of,
+    read_boxes,
     size_of,
     turned,
 )
@@ -74,20 +73,17 @@ def _picture(task: dict[str, Any], source: str) -> AnnotatedPicture:
     where = f"{source}, task {task.get('id', '?')}"
     annotations = [item for item in task.get("annotations") or [] if not item.get("was_cancelled")]
     last = (annotations or task.get("predictions") or [{"result": []}])[-1]
-    boxes: list[Box] = []
-    size, others = None, 0
-    for item in last["result"]:
-        kind, value = str(item.get("type", "")), item.get("value", {})
-        size = size_of(item.get("original_width"), item.get("original_height")) or size
-        if kind not in SHAPES:
-            others += kind.endswith("labels")
-            continue
-        label = value[kind][0] if value.get(kind) else "no label"
-        try:
-            corners = _corners(value, size or (1, 1))
-        except INVALID:
-            corners = NO_CORNERS
-        boxes.append(box_of(label, corners, where, score=item.get("score", 1.0)))
+    # Other results are texts and choices.
+    shapes = [
+        item
+        for item in last["result"]
+        if not isinstance(item, dict) or str(item.get("type", "")).endswith("labels")
+    ]
+    sizes = (_size(item) for item in shapes if isinstance(item, dict))
+    size = next(filter(None, sizes), None)
+    boxes, others = read_boxes(
+        shapes, lambda item, place: _box(item, size or (1, 1), place), f"{where}, result"
+    )
     values = [text for text in task["data"].values() if isinstance(text, str)]
     address = str(task["data"].get("image") or next(iter(values), task.get("id", "?")))
     parts = urlsplit(address)
@@ -95,8 +91,22 @@ def _picture(task: dict[str, Any], source: str) -> AnnotatedPicture:
     # Uploads have a prefix of eight hexadecimal digits.
     name = re.sub(r"^[0-9a-f]{8}-", "", PurePosixPath(path).name) or address
     return AnnotatedPicture(
-        name=name, boxes=tuple(boxes), shares=True, others=others, shot=Shot(size=size)
+        name=name, boxes=boxes, shares=True, others=others, shot=Shot(size=size)
     )
+
+
+def _size(item: dict[str, Any]) -> tuple[int, int] | None:
+    return size_of(item.get("original_width"), item.get("original_height"))
+
+
+def _box(item: dict[str, Any], size: tuple[int, int], where: str) -> Box | None:
+    """Return the box of a result; `size` is that of the picture if the result does not have it."""
+    if (kind := item["type"]) not in SHAPES:
+        return None
+    value = item["value"]
+    label = value[kind][0] if value.get(kind) else "no label"
+    corners = _corners(value, _size(item) or size)
+    return box_of(label, corners, where, score=item.get("score", 1.0))
 
 
 def _corners(value: dict[str, Any], size: tuple[int, int]) -> Corners:
