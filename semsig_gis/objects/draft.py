@@ -27,6 +27,7 @@ from semsig_gis.core import (
     SemsigError,
     SourceError,
     crs_text,
+    nearest_town,
     require_metric_crs,
     temporary_folder,
     town_of,
@@ -51,6 +52,7 @@ from semsig_gis.objects.layers import assemble, read_files
 from semsig_gis.sources import (
     ANY_VALUE,
     BETWEEN_SLASHES,
+    LATITUDE_LIMIT,
     WGS84,
     Condition,
     LayerSpec,
@@ -66,12 +68,16 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from numpy.typing import NDArray
+
     from semsig_gis.core import AnyCrs
     from semsig_gis.objects.guesses import Column, LayerSample
     from semsig_gis.objects.layers import LayerReport
     from semsig_gis.sources import PositionFields, RawLayer
 
 
+# Data of a city is not far from a town.
+NEAR_KM, FAR_KM = 10.0, 50.0
 # Any projected CRS, to read coordinates unchanged.
 PLANE = "EPSG:3857"
 # Mark of lines that a person must check.
@@ -264,6 +270,15 @@ def _towns(layers: Sequence[RawLayer]) -> Iterator[str]:
         xy = xy[np.isfinite(xy).all(axis=1)]
         if len(xy):
             yield f"# Its positions are {town_of(xy, layer.known_crs)}."
+            x, y = np.median(xy, axis=0).tolist()
+            degrees = layer.known_crs.is_geographic and max(abs(x), abs(y)) <= LATITUDE_LIMIT
+            if degrees and nearest_town(x, y).distance_km > FAR_KM:
+                exchanged = nearest_town(y, x)
+                if exchanged.distance_km <= NEAR_KM:
+                    yield (
+                        f"# {EDIT}: with longitude and latitude exchanged they would be "
+                        f"{exchanged}; if that is right, exchange them in the file."
+                    )
             return
 
 
@@ -372,8 +387,22 @@ def _crs(
         return "EPSG:4326", "the file does not say; its coordinates could be degrees"
     raise CrsError(
         f"{path} has coordinates such as ({xy[0][0]:.12g}, {xy[0][1]:.12g}) and does not say in "
-        "which CRS; state it with --crs, such as --crs EPSG:2154."
+        f"which CRS; state it with --crs, such as --crs EPSG:2154{_whole_degrees(xy)}."
     )
+
+
+def _whole_degrees(xy: NDArray[np.float64]) -> str:
+    """Return what to do if whole numbers may be degrees that were multiplied, or nothing."""
+    if not (xy == np.round(xy)).all():
+        return ""
+    for factor in (10**5, 10**6, 10**7):
+        degrees = xy / factor
+        if off_the_globe(degrees, WGS84).any():
+            continue
+        town = nearest_town(*np.median(degrees, axis=0).tolist())
+        if town.distance_km <= NEAR_KM:
+            return f"; divided by {factor:,} they are degrees {town}: if so, divide them first"
+    return ""
 
 
 def _metric_crs(layers: Sequence[LayerSample]) -> str:

@@ -57,7 +57,7 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
         path = Path(text)
         return _area_of(read_polygons(path), str(path), name=path.stem, kind="file")
     try:
-        numbers = tuple(float(number) for number in text.strip("[]() \t").split(","))
+        numbers = tuple(float(number) for number in text.strip("[]() \t").replace(",", " ").split())
         west, south, east, north = numbers
     except ValueError as error:
         raise InputError(

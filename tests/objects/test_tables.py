@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from sentences import refused
 
-from semsig_gis.core import EmptyResultError, SourceError
+from semsig_gis.core import EmptyResultError, SemsigError
 from semsig_gis.objects import draft_catalog, load
 from semsig_gis.sources import transform_points
 
@@ -264,6 +264,10 @@ def test_swiss_grid_is_known_by_its_numbers(names: str, tmp_path: Path) -> None:
         ("1;4.8357;45.764\n2;4.8358;45.765\n", ["no header", "'4.8357'", "'lon;lat;column3'"]),
         ("1;POINT(4.8 45.7)\n2;POINT(4.9 45.7)\n", ["no header"]),
         ("id;lat;lon\n1;here;4.8\n2;there;4.8\n", ["row 1: lat 'here' is not a number"]),
+        (
+            "id;lat;lon\n1;45764000;4835700\n2;45764100;4835800\n",
+            ["divided by 1,000,000", "near Lyon", "--crs"],
+        ),
         ("name;size\na;1\n", ["name, size", "x_field = ", "y_field = ", 'geometry_field = "size"']),
     ],
 )
@@ -272,8 +276,18 @@ def test_refusal_names_the_value_or_the_keys(
 ) -> None:
     file = tmp_path / "street_lights.csv"
     file.write_text(content)
-    with refused(SourceError, *words):
+    with refused(SemsigError, *words):
         draft_catalog(file)
+
+
+def test_draft_asks_about_geometries_with_latitude_first(tmp_path: Path) -> None:
+    file = tmp_path / "street_lights.geojson"
+    points = [{"type": "Point", "coordinates": [y, x]} for x, y in PLACES]
+    features = [{"type": "Feature", "properties": {}, "geometry": point} for point in points]
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    assert "EDIT: with longitude and latitude exchanged they would be near Lyon" in draft_catalog(
+        file
+    )
 
 
 def test_built_in_catalogue_finds_well_known_text_under_any_name(tmp_path: Path) -> None:

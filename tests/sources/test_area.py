@@ -79,7 +79,7 @@ def test_bounding_box_may_cross_180_degrees(
     [
         ("1,2,3", "is not four numbers"),
         ("1,2,3,4,5", "is not four numbers"),
-        ("1 2 3 4", "is not four numbers"),
+        ("1 2 3", "is not four numbers"),
         ("2.4,48.8,2.3,48.9", "west below east"),
         ("10,48,-170,49", "across 180 degrees"),
         ("190,48,-170,49", "across 180 degrees"),
