@@ -154,3 +154,12 @@ def test_damaged_file_is_left_out_of_a_folder(run: Run) -> None:
     code, out, err = run("view . --out v.jsonl --json")
     assert (code, bearings(), *json.loads(out)["damaged_files"]) == (0, BOTH, "e.json")
     assert "left out: 1 file: e.json is not JSON" in err
+
+
+def test_crowds_without_other_objects_are_refused(run: Run) -> None:
+    write_case("p1.jpg", "p1.jpg")
+    content = json.loads(Path("d.json").read_text())
+    for item in content["annotations"]:
+        item |= {"iscrowd": 1, "segmentation": {"size": [1200, 1600], "counts": [10, 9, 1919981]}}
+    Path("d.json").write_text(json.dumps(content))
+    sentence(run("view d.json --out v.jsonl"), "only points, lines or groups; mark each object")

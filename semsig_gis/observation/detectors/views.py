@@ -513,7 +513,7 @@ def _require_objects(tally: Tally) -> None:
         raise InputError(f"{tally.faulty_boxes[0]}; correct the file, or export it again.")
     if tally.no_boxes:
         raise InputError(
-            f"none of the {tally.no_boxes:,} shapes is a box or an outline of one object, only "
+            f"none of the shapes ({tally.no_boxes:,}) is a box or an outline of one object, only "
             "points, lines or groups; mark each object with a box or an outline."
         )
 
