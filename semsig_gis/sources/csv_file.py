@@ -219,9 +219,9 @@ def _layout(lines: Sequence[str], separator: str, first: int, *, titles: bool = 
         names = [first_name, *names[1:]] if first_name else names[1:]
     others = [row for number, row in rows if number > start]
     # Last values may be blank in every row, but not last names.
-    named = len(_trimmed(names))
+    width = len(_trimmed(names))
     same = sum(
-        named in {len(_trimmed(row)), len(row) if named == len(names) else 0} for row in others
+        width in {len(_trimmed(row)), len(row) if width == len(names) else 0} for row in others
     )
     need = (len(others) + bad) / (1 if blanks else 2)
     fits = len(names) > 1 and same >= need

@@ -39,7 +39,8 @@ def frame(rows: int, **columns: Any) -> gpd.GeoDataFrame:  # noqa: ANN401
 
 
 def xy(layer: RawLayer) -> list[list[float]]:
-    return shapely.get_coordinates(layer.table.geometry.array).tolist()
+    places: list[list[float]] = shapely.get_coordinates(layer.table.geometry.array).tolist()
+    return places
 
 
 # Names of fields that GDAL has for the numbers of rows in some formats.

@@ -18,6 +18,7 @@ from semsig_gis.sources import load_catalog, reader
 from semsig_gis.sources.files import file_reader
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from semsig_gis.sources import RawLayer
@@ -109,7 +110,8 @@ def test_xml_of_servers_and_editors_is_read(tmp_path: Path, case: str, name: str
     text = (
         f'<?xml version="1.0"?><osm version="0.6" upload="never">{"".join(elements)}</osm>'.encode()
     )
-    packed = {"gz": gzip.compress, "bz2": bz2.compress}.get(name.rpartition(".")[2], bytes)(text)
+    packers: dict[str, Callable[[bytes], bytes]] = {"gz": gzip.compress, "bz2": bz2.compress}
+    packed = packers.get(name.rpartition(".")[2], bytes)(text)
     path = tmp_path / name
     path.write_bytes(packed)
     layer = read(path)

@@ -307,7 +307,7 @@ MASKS: list[dict[str, Any]] = [
     {**item, "bbox": None, "segmentation": {"size": [400, 800], "counts": counts}}
     for item, counts in zip(COCO["annotations"], (BENCH_RUNS, as_text(SIGN_RUNS)), strict=True)
 ]
-SMALL_TASK = {
+SMALL_TASK: dict[str, Any] = {
     "id": 3,
     "image": "/data/upload/1/0a1b2c3d-street.jpg",
     "annotator": 1,
@@ -1063,7 +1063,7 @@ def test_mapillary_detections_are_grouped_by_image(tmp_path: Path) -> None:
     assert [picture.name for picture in read_pictures([tmp_path])[0]] == ["a", "b"]
 
 
-ROTATED = {
+ROTATED_TASK = {
     "id": 1,
     "data": {"image": "a.jpg"},
     "annotations": [{"result": [rectangle("x", 50, 25, 10, 10, rotation=90)]}],
@@ -1077,7 +1077,7 @@ ROTATED_IN_CVAT = """<annotations><image name="a" width="800" height="400">
     ("name", "text", "corners"),
     [
         # Rotated by 90 degrees about its upper left corner, and about its middle.
-        ("a.json", json.dumps([ROTATED]), (360, 100, 400, 180)),
+        ("a.json", json.dumps([ROTATED_TASK]), (360, 100, 400, 180)),
         ("a.xml", ROTATED_IN_CVAT, (420, 80, 460, 160)),
     ],
 )
