@@ -61,6 +61,18 @@ def test_keys_of_records_are_kept(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("others", "notes"), [([{"id": "a"}] * 5, ()), (ROWS[:1], ("1 records in other lists",))]
+)
+def test_other_lists_are_noted(others: list[Any], notes: tuple[str, ...], tmp_path: Path) -> None:
+    file = tmp_path / "lamps.json"
+    file.write_text(json.dumps({"others": others, "lamps": {"all": ROWS}}))
+    table = open_table(file)
+    assert len(list(table.records(()))) == 2
+    assert len(table.notes) == len(notes)
+    assert all(words in note for words, note in zip(notes, table.notes, strict=True))
+
+
 @pytest.mark.parametrize("content", [{}, {"a": 1}, {"a": {"b": 1}}, {"a": [1, 2]}])
 def test_json_without_records_is_refused(content: object, tmp_path: Path) -> None:
     file = tmp_path / "lamps.json"

@@ -13,27 +13,42 @@ DEEPEST = 5
 LEAST_RECORDS = 2  # of a mapping, which otherwise may be a record itself
 
 
-def find_records(content: Any) -> list[Any] | None:  # noqa: ANN401 - any JSON
-    """Return the list of records in parsed JSON, None if there is none.
+def find_records(
+    content: Any,  # noqa: ANN401 - any JSON
+) -> tuple[list[Any] | None, tuple[str, ...]]:
+    """Return the list of records in parsed JSON, None if there is none, and notes.
 
     Records are a list of mappings, a mapping of mappings, columns, or rows with the names of their
-    columns; of several lists, the longest. Values of SPARQL are taken out of their mappings.
+    columns; of several lists, the one with most records that have more than texts and whole
+    numbers, as positions are. Values of SPARQL are taken out of their mappings.
     """
-    if isinstance(content, list):
-        return content
     if not isinstance(content, dict):
-        return None
+        return (content if isinstance(content, list) else None), ()
     for key in KEYS:
         rows = content.get(key)
         if isinstance(rows, list):
-            return rows
-    longest = max(_candidates(content, DEEPEST), key=len, default=None)
-    if longest is not None and "head" in content:
+            return rows, ()
+    lists = sorted(_candidates(content, DEEPEST), key=_rank, reverse=True)
+    if not lists:
+        return None, ()
+    longest, *others = lists
+    if "head" in content:
         return [
             {name: value.get("value") for name, value in row.items() if isinstance(value, dict)}
             for row in longest
-        ]
-    return longest
+        ], ()
+    count = sum(rank for rank, _ in map(_rank, others))
+    if not count:
+        return longest, ()
+    return longest, (
+        f"{count:,} records in other lists of the file were not read; save each list as a file",
+    )
+
+
+def _rank(rows: list[Any]) -> tuple[int, int]:
+    """Return the number of records that may have a position, and of all records."""
+    parts = (float, list, dict)
+    return sum(any(isinstance(value, parts) for value in row.values()) for row in rows), len(rows)
 
 
 def _candidates(content: dict[str, Any], depth: int) -> Iterator[list[Any]]:

@@ -127,7 +127,7 @@ def _json(path: Path) -> ServiceTable:
         raise SourceError(f"{path} is not whole JSON ({error}); download it again.") from error
     if isinstance(content, dict) and isinstance(content.get("result"), dict):
         content = content["result"]  # CKAN wraps its answers
-    items, system, has_geometry = find_records(content), None, False
+    (items, notes), system, has_geometry = find_records(content), None, False
     if isinstance(content, dict):
         has_geometry = "features" in content
         system = _json_crs(content, path)
@@ -147,6 +147,7 @@ def _json(path: Path) -> ServiceTable:
         crs=system,
         empty=not records,
         rest=max(total - len(records), 0) if isinstance(total, int) else 0,
+        notes=notes,
     )
 
 
