@@ -57,18 +57,26 @@ def wall_grid(ends: NDArray[np.float64], owner: NDArray[np.int32]) -> WallGrid:
 
 
 @compiled  # pragma: no cover - coverage does not see machine code
+def _cells_of(wall: NDArray[np.float64], size: float) -> tuple[int, int, int, int]:
+    """Return the first row and the one after the last that a wall may cross, then the columns."""
+    ax, ay, bx, by = wall
+    return (
+        int((min(ay, by) - MARGIN_M) / size),
+        int((max(ay, by) + MARGIN_M) / size) + 1,
+        int((min(ax, bx) - MARGIN_M) / size),
+        int((max(ax, bx) + MARGIN_M) / size) + 1,
+    )
+
+
+@compiled  # pragma: no cover - coverage does not see machine code
 def _count_walls(
     walls: NDArray[np.float64], size: float, columns: int, first: NDArray[np.int64]
 ) -> None:
     """Fill `first` with the sums of the numbers of walls in the cells before each cell."""
     for wall in range(len(walls)):
-        ax, ay, bx, by = walls[wall]
-        for row in range(
-            int((min(ay, by) - MARGIN_M) / size), int((max(ay, by) + MARGIN_M) / size) + 1
-        ):
-            for column in range(
-                int((min(ax, bx) - MARGIN_M) / size), int((max(ax, bx) + MARGIN_M) / size) + 1
-            ):
+        south, north, west, east = _cells_of(walls[wall], size)
+        for row in range(south, north):
+            for column in range(west, east):
                 first[row * columns + column + 1] += 1
     for cell in range(1, len(first)):
         first[cell] += first[cell - 1]
@@ -84,13 +92,9 @@ def _sort_walls(
 ) -> None:
     """Fill `entries` with the walls of each cell, the first one at its place."""
     for wall in range(len(walls)):
-        ax, ay, bx, by = walls[wall]
-        for row in range(
-            int((min(ay, by) - MARGIN_M) / size), int((max(ay, by) + MARGIN_M) / size) + 1
-        ):
-            for column in range(
-                int((min(ax, bx) - MARGIN_M) / size), int((max(ax, bx) + MARGIN_M) / size) + 1
-            ):
+        south, north, west, east = _cells_of(walls[wall], size)
+        for row in range(south, north):
+            for column in range(west, east):
                 cell = row * columns + column
                 entries[places[cell]] = wall
                 places[cell] += 1
