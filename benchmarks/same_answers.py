@@ -1,0 +1,155 @@
+"""Save answers of the likelihood method to seeded views, and compare them with those of other code.
+
+``python -m benchmarks.same_answers OUT.json`` locates the same views in a made-up city like Paris,
+and in Montpellier and Helsinki of the folder that SEMSIG_GEODATA names, each with and without the
+search between the viewpoints. ``--compare OLD.json NEW.json`` prints how many of the answers have
+the same place (within 1 m) and the same chance (within 0.01).
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from benchmarks._cities import PARIS_LIKE, made_up, made_up_streets, real
+from benchmarks._measuring import add_geodata, available_cities, read_rows, write_rows
+from benchmarks.views import NOISE
+from semsig_gis.database import ObjectStore, build_database
+from semsig_gis.evaluation import QuerySpec, draw_queries, parse_chain
+from semsig_gis.localization import (
+    build_index,
+    cell_noise,
+    locate,
+    named_noise,
+    usual_noise,
+)
+from semsig_gis.sources import PARIS_LIKE as LIKE_PARIS
+from semsig_gis.sources import CitySpec
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterator
+
+    from semsig_gis.evaluation import SeenFrom
+
+__all__ = ["answers"]
+
+_CITIES = (PARIS_LIKE, "Montpellier", "Helsinki")
+# By kind of views: where they are seen from, their distortions, and the deviation of north.
+_KINDS: dict[str, tuple[SeenFrom, str, float]] = {
+    "grid": ("cells", "view:360", 0.0),
+    "anywhere": ("anywhere", "view:360", 0.0),
+    "photo of 70 degrees": ("anywhere", "view:70", 0.0),
+    "ranges": ("anywhere", "ranges:25, view:360", 0.0),
+    "north unknown": ("anywhere", "view:360, compass:360", math.inf),
+}
+_NEAR_M, _NEAR_CHANCE = 1.0, 0.01
+
+
+def main() -> None:
+    """Save answers, or compare two files of them."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.same_answers", description=__doc__)
+    parser.add_argument("out", type=Path, nargs="?", metavar="OUT.json")
+    parser.add_argument("--views", type=int, default=20, help="of each kind and city")
+    parser.add_argument("--city", choices=_CITIES, action="append", help="default: all of them")
+    parser.add_argument("--size", choices=("full", "small"), default="full")
+    parser.add_argument("--compare", type=Path, nargs=2, metavar=("OLD.json", "NEW.json"))
+    add_geodata(parser)
+    options = parser.parse_args()
+    if options.compare:
+        _compare(*options.compare)
+        return
+    if options.out is None:
+        parser.error("give OUT.json, or --compare")
+    cities = available_cities(options.city or _CITIES, options.geodata, made_up=PARIS_LIKE)
+    small = options.size == "small"
+    rows = [
+        row for city in cities for row in answers(city, options.geodata, options.views, small=small)
+    ]
+    write_rows(options.out, rows)
+
+
+def answers(
+    city: str, geodata: str | os.PathLike[str] | None, views: int, *, small: bool = False
+) -> Iterator[dict[str, Any]]:
+    """Yield the answers to some views of each kind in a city."""
+    if city == PARIS_LIKE:
+        spec = CitySpec(size=300.0) if small else LIKE_PARIS
+        objects = made_up(spec)
+        database = made_up_streets(spec, objects)
+    else:
+        objects = real(Path(geodata or "."), city)
+        database = build_database(objects)
+    store = ObjectStore.of(objects)
+    for kind, (seen_from, chain, north_sigma) in _KINDS.items():
+        start = time.perf_counter()
+        distortions = parse_chain(f"detector:{NOISE.name}, {chain}", noises={NOISE.name: NOISE})
+        spec_of_views = QuerySpec(number=4 * views, seen_from=seen_from, distortions=distortions)
+        queries = [
+            query.asked.signature for query in draw_queries(database, spec_of_views, store=store)
+        ]
+        for number, query in enumerate([query for query in queries if len(query)][:views]):
+            noise = named_noise(usual_noise(query))
+            if seen_from != "cells":
+                noise = cell_noise(noise, database.grid.step)
+            index = build_index(database, noise)
+            # Between the viewpoints are no views from the grid.
+            for refined in (False, True)[: 1 + (seen_from != "cells")]:
+                location = locate(
+                    index, query, store=store, refined=refined, north_sigma=north_sigma
+                )
+                yield {
+                    "city": city,
+                    "kind": kind,
+                    "number": number,
+                    "refined": refined,
+                    "objects": len(query),
+                    "xy": [round(metres, 3) for metres in location.xy],
+                    "chance": round(location.chance, 5),
+                    "elsewhere": round(location.elsewhere, 5),
+                    "heading": location.estimate.heading,
+                    "region": len(location.region),
+                }
+        print(f"{city}, {kind}: {time.perf_counter() - start:.0f} s", flush=True)
+
+
+def _compare(old: Path, new: Path) -> None:
+    """Print the share of equal answers by kind of view, and those that differ."""
+
+    def by_view(path: Path) -> dict[tuple[Any, ...], dict[str, Any]]:
+        keys = ("city", "kind", "number", "refined")
+        return {tuple(row[key] for key in keys): row for row in read_rows(path)}
+
+    before, after = by_view(old), by_view(new)
+    counts: Counter[tuple[str, str]] = Counter()
+    for view in before.keys() & after.keys():
+        was, now = before[view], after[view]
+        away = math.dist(was["xy"], now["xy"])
+        changes = {name: abs(was[name] - now[name]) for name in ("chance", "elsewhere")}
+        facts = {
+            "views": True,
+            "place": away <= _NEAR_M,
+            "chance": max(changes.values()) <= _NEAR_CHANCE,
+        }
+        for kind in (view[1], "all"):
+            counts.update((kind, fact) for fact, holds in facts.items() if holds)
+        if not all(facts.values()):
+            print(
+                f"{view}: {was['objects']} objects, {away:.1f} m, chance {was['chance']:.3f} "
+                f"{now['chance']:.3f}, elsewhere {was['elsewhere']:.3f} {now['elsewhere']:.3f}"
+            )
+    for kind in (*_KINDS, "all"):
+        views, places, chances = (counts[kind, fact] for fact in ("views", "place", "chance"))
+        if views:
+            print(
+                f"{kind}: {views} answers, the same place {places / views:.1%}, "
+                f"the same chance {chances / views:.1%}"
+            )
+
+
+if __name__ == "__main__":
+    main()
