@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core import FULL_TURN, PackedIndex, signed_degrees
+from semsig_gis.core import FULL_TURN, ObjectIndex, share_rows, signed_degrees
 from semsig_gis.database.occlusion import hidden
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core import ObjectIndex
     from semsig_gis.database.occlusion import Footprints
     from semsig_gis.objects import StreetObjects
 
 
 BEARING_DECIMALS = 9
+PLACES_A_THREAD = 512  # the fewest places that are worth a thread
 BEARING_BITS = 40  # of a bearing in a sort key: finer than its nine decimals
 
 
@@ -117,9 +117,10 @@ def landmark_tops(objects: StreetObjects) -> NDArray[np.float64] | None:
 
     It is infinite if it is unknown, and NaN for objects that are not tall.
     """
-    tall = np.isin(objects.codes, objects.taxonomy.tall_codes)
-    if not tall.any():
+    codes = np.intersect1d(objects.present_codes, objects.taxonomy.tall_codes)
+    if not len(codes):
         return None
+    tall = np.isin(objects.codes, codes)
     tops = np.full(len(tall), math.nan)
     tops[tall] = math.inf
     if objects.heights is not None:
@@ -224,40 +225,64 @@ def visible_objects_at(
 ) -> VisibleObjects:
     """Return the objects visible from any places, in metres in the CRS of the objects, unrounded.
 
-    `index` is an R-tree over ``objects.xy``; `radius` is the visibility range in metres of classes
+    `index` is over ``objects.xy``; `radius` is the visibility range in metres of classes
     without a range of their own. Objects that `footprints` hide are left out.
     """
+    from semsig_gis.database.clockwise import measure_clockwise  # noqa: PLC0415 - numba, 0.25 s
+
     codes, xy = objects.codes, objects.xy
-    ranges, tops = objects.taxonomy.ranges(radius)[codes], landmark_tops(objects)
     places = np.ascontiguousarray(places, dtype=np.float64)
-    if tops is None:
-        viewpoint, item = index.pairs_within(places, radius=float(ranges.max()))
-    else:
-        # There are few landmarks, but very many other objects are in range of one.
-        near, tall = np.isnan(tops), np.flatnonzero(~np.isnan(tops))
-        viewpoint, item = index.pairs_within(places, radius=float(ranges[near].max(initial=0.0)))
-        viewpoint, item = viewpoint[near[item]], item[near[item]]
-        further = PackedIndex(xy[tall]).pairs_within(places, radius=float(ranges[tall].max()))
-        viewpoint = np.concatenate([viewpoint, further[0]])
-        item = np.concatenate([item, tall[further[1]]])
-    pairs = measure_sightings(
-        viewpoint,
-        item,
-        places,
-        xy,
-        ranges=ranges,
-        footprints=footprints,
-        groups=objects.groups,
-        tops=tops,
+    offsets, rows = _in_range(objects, places, index, objects.taxonomy.ranges(radius))
+    near, rows = rows, np.empty_like(rows)
+    bearing, distance = np.empty((2, len(rows)))
+    share_rows(
+        lambda part: measure_clockwise(
+            part, places, xy, codes, offsets, near, rows, bearing, distance
+        ),
+        len(places),
+        least=PLACES_A_THREAD,
     )
-    order = clockwise_order(pairs, codes)
-    lengths = np.bincount(pairs.viewpoint, minlength=len(places))
-    rows = pairs.object[order]
+    extents = None
+    if footprints is not None or objects.groups is not None:
+        viewpoint = np.repeat(np.arange(len(places)), np.diff(offsets))
+        pairs = SightingPairs(viewpoint, rows, bearing, distance)
+        if footprints is not None:
+            pairs = pairs.take(~_hidden(pairs, places, xy, footprints, landmark_tops(objects)))
+        if objects.groups is not None:
+            pairs = _nearest_points(pairs, objects.groups)
+        lengths = np.bincount(pairs.viewpoint, minlength=len(places))
+        offsets, extents = np.append(0, np.cumsum(lengths)), pairs.extent
+        rows, bearing, distance = pairs.object, pairs.bearing, pairs.distance
     return VisibleObjects(
-        offsets=np.append(0, np.cumsum(lengths)),
+        offsets=offsets,
         objects=rows,
         codes=codes[rows],
-        bearings=pairs.bearing[order],
-        distances=pairs.distance[order],
-        extents=None if pairs.extent is None else pairs.extent[order],
+        bearings=bearing,
+        distances=distance,
+        extents=extents,
     )
+
+
+def _in_range(
+    objects: StreetObjects,
+    places: NDArray[np.float64],
+    index: ObjectIndex,
+    ranges: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the objects within the range of their class, as `ObjectIndex.points_in_range`."""
+    codes, present = objects.codes, objects.present_codes
+    low = np.setdiff1d(present, objects.taxonomy.tall_codes)
+    reach = float(ranges[low].max(initial=0.0))
+    offsets, rows = index.points_in_range(places, ranges=ranges, kinds=codes, reach=reach)
+    farthest = float(ranges[present].max())
+    if farthest <= reach:
+        return offsets, rows
+    # There are few landmarks, but very many other objects are in range of one.
+    far = np.flatnonzero(ranges[codes] > reach)
+    further = ObjectIndex(objects.xy[far]).points_in_range(
+        places, ranges=ranges, kinds=codes[far], reach=farthest
+    )
+    rows = np.concatenate([rows, far[further[1]]])
+    lengths = np.diff([offsets, further[0]])
+    viewpoint = np.concatenate([np.repeat(np.arange(len(places)), each) for each in lengths])
+    return offsets + further[0], rows[np.argsort(viewpoint, kind="stable")]

@@ -178,6 +178,11 @@ class StreetObjects(Displayed):
         return codes
 
     @functools.cached_property
+    def present_codes(self) -> NDArray[np.uint8]:
+        """Class codes of the objects, ascending."""
+        return np.flatnonzero(np.bincount(self.codes)).astype(np.uint8)
+
+    @functools.cached_property
     def arrow(self) -> pa.Table:
         """The columns of `table` as an Arrow table, with the geometry as well-known binary."""
         columns = {
@@ -207,7 +212,7 @@ class StreetObjects(Displayed):
         heights.setflags(write=False)
         return heights
 
-    @property
+    @functools.cached_property
     def texts(self) -> pa.Table | None:
         """The columns of what is written on the objects; None if nothing is."""
         names = [name for name in TEXTS if name in self.arrow.column_names]

@@ -78,6 +78,36 @@ def test_pairs_equal_a_brute_force_search(
     assert pairs_of(points, views, radius) == expected
 
 
+@given(
+    st.lists(st.tuples(PLACES | ANYWHERE, st.integers(0, 2)), min_size=1, max_size=40),
+    st.lists(PLACES | ANYWHERE | st.just((1e9, -1e9)), max_size=10),
+    st.tuples(RADII, RADII, RADII | st.floats(0.1, 1e4)),
+    CORNERS,
+)
+@settings(max_examples=100)
+def test_points_in_the_range_of_their_kind_equal_a_brute_force_search(
+    points: list[tuple[tuple[float, float], int]],
+    views: Points,
+    ranges: tuple[float, float, float],
+    corner: tuple[float, float],
+) -> None:
+    xy, places = shifted([place for place, _ in points], corner), shifted(views, corner)
+    kinds = np.array([kind for _, kind in points], np.uint8)
+    reach = max(ranges[:2])
+    offsets, near = ObjectIndex(xy).points_in_range(
+        places, ranges=np.array(ranges), kinds=kinds, reach=reach
+    )
+    assert len(offsets) == len(places) + 1
+    for number, place in enumerate(places.tolist()):
+        limits = [ranges[kind] for kind in kinds.tolist()]
+        expected = [
+            row
+            for row, (point, limit) in enumerate(zip(xy.tolist(), limits, strict=True))
+            if limit <= reach and distance(point, place) <= limit
+        ]
+        assert sorted(near[offsets[number] : offsets[number + 1]].tolist()) == expected
+
+
 @pytest.mark.parametrize("corner", [(0.0, 0.0), (765_200.0, 6_275_000.0), (0.1, 0.7)])
 def test_point_exactly_at_the_radius_is_included(corner: tuple[float, float]) -> None:
     ring = [(30, 0), (-30, 0), (0, 30), (0, -30), (18, 24), (-24, 18), (24, -18), (-18, -24)]

@@ -180,6 +180,31 @@ def test_visible_objects_of_cells_equal_those_at_their_viewpoints(world: World) 
     assert len(stored) == len(database)
 
 
+@given(
+    worlds(), st.lists(st.tuples(st.floats(-40, 40), st.floats(-40, 40)), min_size=1, max_size=8)
+)
+def test_visible_objects_are_those_in_range_clockwise(
+    world: World, places: list[tuple[float, float]]
+) -> None:
+    objects = world.street_objects
+    index, at = ObjectIndex(objects.xy), np.concatenate([objects.xy[:3], np.array(places)])
+    visible = visible_objects_at(objects, at, index=index, radius=world.radius)
+    assert len(visible) == len(at)
+    ranges = objects.taxonomy.ranges(world.radius)[objects.codes]
+    for number, place in enumerate(at):
+        away = objects.xy - place
+        metres = np.hypot(*away.T)
+        degrees = np.round(bearings(*away.T), 9) % 360.0
+        order = np.lexsort((objects.codes, metres, degrees))
+        order = order[metres[order] <= ranges[order]]
+        part = slice(*visible.offsets[number : number + 2])
+        # Objects at one place with one class may change places.
+        assert visible.codes[part].tolist() == objects.codes[order].tolist()
+        assert sorted(visible.objects[part].tolist()) == sorted(order.tolist())
+        assert visible.bearings[part] == pytest.approx(degrees[order], abs=2e-9)
+        assert visible.distances[part] == pytest.approx(metres[order])
+
+
 def test_visible_objects_are_not_behind_buildings() -> None:
     world = World(((10.0, 0.0, CODES[0]), (-10.0, 0.0, CODES[0])))
     objects = world.street_objects

@@ -160,6 +160,7 @@ def cell_estimate(
         off = signed_degrees(turns - headings[:, None])
         heading_sigmas = np.sqrt((shares * off**2).sum(axis=1) + HEADING_STEP**2 / 12.0)
     parts = Refinement(
+        cells=inside,
         places=database.xy[inside],
         sizes=np.full(len(inside), database.grid.step),
         loglik=np.zeros(len(inside)),
@@ -185,6 +186,7 @@ def refined_estimate(
         return None
     parts = replace(
         refinement,
+        cells=refinement.cells[inside],
         places=refinement.places[inside],
         sizes=refinement.sizes[inside],
         loglik=refinement.loglik[inside],

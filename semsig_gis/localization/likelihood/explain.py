@@ -233,7 +233,7 @@ def explain(
     x, y = map(float, xy)
     place = np.array([[x, y]])
     view = visible_objects_at(objects, place, index=index, radius=radius, footprints=footprints)
-    codes = np.flatnonzero(np.bincount(objects.codes)).astype(np.uint8)
+    codes = objects.present_codes
     scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, radius, objects)
     return scene.explanation(query, noise, heading, query if plain is None else plain)
 
@@ -420,12 +420,11 @@ class _Scene:
             angle = np.radians(bearing)
             place = float(x + distance * np.sin(angle)), float(y + distance * np.cos(angle))
             return facts | {"place": place}
-        row = int(view.objects[entry])
-        table = self.objects.table
+        row, table = int(view.objects[entry]), self.objects.arrow
         return facts | {
             "object": row,
-            "source": str(table[SOURCE].iloc[row]),
-            "source_id": str(table[SOURCE_ID].iloc[row]),
+            "source": table[SOURCE][row].as_py(),
+            "source_id": table[SOURCE_ID][row].as_py(),
             "object_text": best_text(self.objects, row, text),
             "place": tuple(self.objects.xy[row].tolist()),
         }

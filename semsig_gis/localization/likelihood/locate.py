@@ -53,6 +53,7 @@ from semsig_gis.localization.likelihood.explain import (
 from semsig_gis.localization.likelihood.index import CellScores, photo_power
 from semsig_gis.localization.likelihood.posterior import (
     DIVIDED_PARTS,
+    holding,
     prior_ratio,
     refine,
 )
@@ -88,6 +89,7 @@ MOST_PLACES = 100
 """Most places of a region that are counted."""
 ROUNDING = 1e-9
 TINY = np.finfo(np.float64).tiny
+UNREFINED = 3e-4  # share of the chance of the likeliest cells that are not divided
 LEAST_REFINED = 0.02
 """Least chance of a version of a query for a search between the viewpoints."""
 
@@ -732,7 +734,7 @@ class LikelihoodLocator:
         """Return the chances of the parts of the likeliest cells."""
         database, chances = posterior.database, posterior.chances
         cells = posterior.likeliest(DIVIDED_PARTS[0])
-        cells = cells[chances[cells] > 0]
+        cells = cells[holding(chances[cells], UNREFINED)]
         reading, extra = self._reading(query), np.zeros(len(cells))
         if reading.extra is not None:
             extra = reading.extra[cells]
@@ -749,9 +751,9 @@ class LikelihoodLocator:
             log_prior=np.log(chances[cells]) - scores.loglik[cells] + extra,
             occlusion=database.occlusion,
         )
-        if reading.extra is None:
-            return parts
-        return replace(parts, loglik=parts.loglik + reading.extra[_owners(parts, database)])
+        rows = cells[parts.cells]
+        loglik = parts.loglik if reading.extra is None else parts.loglik + reading.extra[rows]
+        return replace(parts, cells=rows, loglik=loglik)
 
     def _explanation(
         self, query: Signature, cell: int, scores: CellScores, parts: Refinement | None
@@ -769,7 +771,7 @@ class LikelihoodLocator:
             )
             return explanation.numbered(reading.rows) if divided else explanation
         x, y = database.xy[cell].tolist()
-        if parts is not None and len(inside := np.flatnonzero(_owners(parts, database) == cell)):
+        if parts is not None and len(inside := np.flatnonzero(parts.cells == cell)):
             best = inside[parts.loglik[inside].argmax()]
             x, y = parts.places[best].tolist()
             headings[0] = float(parts.headings[best])
@@ -1011,21 +1013,21 @@ def _with_parts(
     parts: Refinement, scores: CellScores, before: Posterior
 ) -> tuple[CellScores, Posterior]:
     """Return the scores and chances of the cells, replaced by those of the parts."""
-    database = before.database
-    owners = _owners(parts, database)
-    cells, rows = np.unique(owners, return_inverse=True)
-    shares = np.bincount(rows, parts.chances)
+    step = before.database.grid.step
+    order = np.argsort(parts.cells, kind="stable")
+    owners = parts.cells[order]
+    firsts = np.flatnonzero(np.diff(owners, prepend=-1))
+    cells = owners[firsts]
     chances = before.chances.copy()
-    chances[cells] = shares * before.chances[cells].sum()
-    means = np.full(len(cells), -np.inf)
-    np.logaddexp.at(means, rows, parts.loglik + 2.0 * np.log(parts.sizes / database.grid.step))
+    chances[cells] = np.add.reduceat(parts.chances[order], firsts) * before.chances[cells].sum()
+    logs = parts.loglik[order] + 2.0 * np.log(parts.sizes[order] / step)
     loglik = scores.loglik.astype(np.float64)
-    loglik[cells] = means
+    loglik[cells] = np.logaddexp.reduceat(logs, firsts)
     heading = scores.heading
     if heading is not None:
         heading = heading.copy()
         order = np.argsort(parts.chances, kind="stable")  # the likeliest part comes last
-        heading[owners[order]] = parts.headings[order]
+        heading[parts.cells[order]] = parts.headings[order]
     parted = CellScores(loglik=loglik, headings=(heading, *scores.headings[1:]))
     return parted, replace(before, chances=chances)
 
@@ -1038,9 +1040,3 @@ def _text_store(store: ObjectStore | None, city: City | ObjectStore | None) -> O
         return city.store if isinstance(city, City) else city
     except DatabaseError:
         return None
-
-
-def _owners(parts: Refinement, database: SignatureDatabase) -> NDArray[np.int64]:
-    """Return the row of the cell that each part lies in."""
-    ids = cell_ids(*database.grid.cells_at(parts.places))
-    return np.asarray(np.searchsorted(database.cell_ids, ids))

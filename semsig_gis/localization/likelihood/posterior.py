@@ -8,9 +8,9 @@ distribution, so that its likelihood is about the mean over the part.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from semsig_gis.database import TOLERANCE_M, visible_objects_at
 from semsig_gis.localization.likelihood.association import turn_logs
 from semsig_gis.localization.likelihood.index import own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
+from semsig_gis.localization.noise.model import cell_noise
 from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables
 from semsig_gis.observation import View, check_north
 
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from semsig_gis.core import Signature
     from semsig_gis.database import ObjectStore, SignatureDatabase
     from semsig_gis.localization.noise.model import Noise
-
 
 LEAST_LOG = -700.0  # its exponential is above 0
 ROUNDING = 1e-3  # of a sum of chances in a file of float32
@@ -341,10 +341,11 @@ class Refinement:
 
     By square part of a cell: `places`, shape (p, 2), are centres and `sizes` sides in metres;
     `loglik` is the mean over the part; `headings` are the mean degrees to add to the bearings of
-    the query (0 if north is known), with `heading_sigmas`; `chances` sum to one. The best place is
-    the mean over `near` metres around it.
+    the query (0 if north is known), with `heading_sigmas`; `chances` sum to one. `cells` are the
+    rows of the cells. The best place is the mean over `near` metres around it.
     """
 
+    cells: NDArray[np.int64]
     places: NDArray[np.float64]
     sizes: NDArray[np.float64]
     loglik: NDArray[np.float64]
@@ -394,6 +395,13 @@ class Refinement:
         return np.asarray(inside[np.round(inside @ self.chances, 9).argmax()])
 
 
+def holding(chances: NDArray[np.float64], rest: float) -> NDArray[np.int64]:
+    """Return the fewest numbers that hold all of some chances but a share, likeliest first."""
+    order = np.argsort(-chances, kind="stable")
+    sums = np.cumsum(chances[order])
+    return order[: int(np.searchsorted(sums, (1.0 - rest) * sums[-1])) + 1]
+
+
 def refine(
     query: Signature,
     cells: NDArray[np.float64],
@@ -413,8 +421,9 @@ def refine(
     metres of the likeliest cells, likeliest first; some hundred are enough. `noise` is for a known
     place. `step` and `radius` are in metres; `north_sigma`, in degrees, is for photos without their
     own. If it is not 0, `headings` are required: by photo, the likeliest one in each cell. Those of
-    the result are of the first photo. `log_prior` is the prior of the cells. If `occlusion`, that
-    of the database, is None, the buildings of the store hide nothing.
+    the result are of the first photo, and its cells are rows of `cells`. `log_prior` is the prior
+    of the cells. If `occlusion`, that of the database, is None, the buildings of the store hide
+    nothing.
     """
     check_north(north_sigma)
     photos = View.of(query).split()
@@ -429,18 +438,11 @@ def refine(
             "give at least one cell, and headings where north is not known."
         )
     objects = store.objects
-    tables, weights = noise_tables(
-        noise,
-        taxonomy=objects.taxonomy,
-        codes=np.unique(objects.codes),
-        longest=LONGEST_TABLE,
-        radius=radius,
-    )
-    photo_tables = [PhotoTable.of(photo, tables[0]) for photo in photos]
     size, most = float(step), DIVIDED_PARTS[0]
     near = objects.taxonomy.near_reach(radius)
     footprints = store.buildings_around(cells, distance=near + size, occlusion=occlusion)
     parts = np.asarray(cells[:most], dtype=np.float64)
+    owners = np.arange(len(parts))
     prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[:most]
     turned = np.stack(
         [
@@ -448,19 +450,23 @@ def refine(
             for heading in first_headings
         ]
     )
-    finished: list[tuple[NDArray[np.float64], ...]] = []
+    finished: list[tuple[NDArray[Any], ...]] = []
     for level, turn in enumerate(LEVEL_TURNS):
         # Quarters of the parts, with a place anywhere in them.
         parts = (parts[:, None] + CORNERS * (size / 4.0)).reshape(-1, 2)
-        prior, turned = np.repeat(prior, 4), np.repeat(turned, 4, axis=1)
+        owners, prior = np.repeat(owners, 4), np.repeat(prior, 4)
+        turned = np.repeat(turned, 4, axis=1)
         size /= 2.0
         views = visible_objects_at(
             objects, parts, index=store.index, radius=radius, footprints=footprints
         )
-        wide = [
-            replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
-            for table in tables
-        ]
+        tables, weights = noise_tables(
+            cell_noise(noise, size),
+            taxonomy=objects.taxonomy,
+            codes=objects.present_codes,
+            longest=LONGEST_TABLE,
+            radius=radius,
+        )
         loglik, sigmas = np.zeros(len(parts)), np.zeros(len(parts))
         for number in reversed(range(len(photos))):  # `sigmas` are at last those of the first
             sigma = north_sigmas[number]
@@ -468,9 +474,9 @@ def refine(
             turns = turned[number][:, None] + steps
             chances = turn_logs(turns, steps[1] - steps[0], sigma) if sigma > 0 else 0.0 * turns
             by_turn = chances + photo_loglik(
-                photo_tables[number],
+                PhotoTable.of(photos[number], tables[0]),
                 views,
-                wide,
+                tables,
                 weights,
                 turns=turns,
                 log_prior=chances + prior[:, None],
@@ -489,13 +495,18 @@ def refine(
         if level + 1 < len(LEVEL_TURNS):
             best = np.argsort(-total, kind="stable")[: DIVIDED_PARTS[level + 1]]
             divided[best] = total[best] > total[best[0]] + math.log(LEAST_PART_CHANCE)
-        columns = parts, np.full(len(parts), size), loglik, prior, turned[0], sigmas
+        sizes = np.full(len(parts), size)
+        columns = owners, parts, sizes, loglik, prior, turned[0], sigmas
         finished.append(tuple(column[~divided] for column in columns))
-        parts, prior, turned = parts[divided], prior[divided], turned[:, divided]
-    places, sizes, loglik, prior, first, sigmas = map(np.concatenate, zip(*finished, strict=True))
+        owners, parts, prior = owners[divided], parts[divided], prior[divided]
+        turned = turned[:, divided]
+    owners, places, sizes, loglik, prior, first, sigmas = map(
+        np.concatenate, zip(*finished, strict=True)
+    )
     weight = loglik + prior + 2.0 * np.log(sizes)
     chances = np.exp(weight - weight.max())
     return Refinement(
+        cells=owners,
         places=places,
         sizes=sizes,
         loglik=loglik,

@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -222,6 +223,9 @@ class NoiseSpec(Displayed):
         """The chance of the only model, 1."""
         return (1.0,)
 
+    def __hash__(self) -> int:  # noqa: D105 - of the tables by class is none
+        return hash((self.name, self.position_sigma))
+
     def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseSpec:
         """Return the model after a change; a mixture changes each of its models."""
         return change(self)
@@ -338,8 +342,7 @@ def cell_noise(noise: Noise, step: float) -> Noise:
     """
 
     def widened(spec: NoiseSpec) -> NoiseSpec:
-        sigma = math.hypot(spec.position_sigma, step / math.sqrt(12.0))
-        return replace(spec, position_sigma=sigma)
+        return _moved(spec, math.hypot(spec.position_sigma, step / math.sqrt(12.0)))
 
     return noise.changed(widened)
 
@@ -360,9 +363,15 @@ def place_noise(noise: Noise, step: float) -> Noise:
                 f"index for cell_noise(noise, {step:g}), which is for queries from anywhere in "
                 "them."
             )
-        return replace(spec, position_sigma=0.0 if variance < ROUNDING else math.sqrt(variance))
+        return _moved(spec, 0.0 if variance < ROUNDING else math.sqrt(variance))
 
     return noise.changed(narrowed)
+
+
+@lru_cache(maxsize=64)
+def _moved(spec: NoiseSpec, position_sigma: float) -> NoiseSpec:
+    """Return a model with another position uncertainty."""
+    return replace(spec, position_sigma=position_sigma)
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -235,6 +235,15 @@ def noise_tables(
             radius=radius,
         )
         return tuple(table.divided(taxonomy) for table in tables), weights
+    return _noise_tables(noise, taxonomy, bytes(codes), longest, radius)
+
+
+@lru_cache(maxsize=24)
+def _noise_tables(
+    noise: Noise, taxonomy: Taxonomy, present: bytes, longest: int, radius: float
+) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
+    """Return `noise_tables` of classes that are not divided; the last ones are kept."""
+    codes = np.frombuffer(present, np.uint8)
     noise = noise_by_class(noise, taxonomy, set(codes.tolist()))
     # Values of other classes go to a row after the last, which is dropped.
     row_of = {code: row for row, code in enumerate(codes.tolist())}

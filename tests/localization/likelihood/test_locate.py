@@ -395,6 +395,7 @@ def parts(places: np.ndarray, headings: list[float], chances: list[float]) -> Re
     """Return parts of two metres with headings that are exact to one degree."""
     count = len(places)
     return Refinement(
+        cells=np.arange(count),
         places=places,
         sizes=np.full(count, 2.0),
         loglik=np.zeros(count),
