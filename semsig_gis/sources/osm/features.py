@@ -225,7 +225,8 @@ def has_element_columns(fields: Iterable[str]) -> bool:
     fields = set(fields)
     pairs = (pair for pair in KINDS_AND_NUMBERS if pair != (TYPE, "id"))
     has_names = not fields.isdisjoint({QUACKOSM, "@id", "@osmId", "full_id", NUMBER})
-    return has_tag_columns(fields) and (has_names or any(fields.issuperset(pair) for pair in pairs))
+    # The tags come last, because it takes 0.2 s to read the catalogue that lists them.
+    return (has_names or any(map(fields.issuperset, pairs))) and has_tag_columns(fields)
 
 
 def has_tag_columns(fields: Iterable[str]) -> bool:
