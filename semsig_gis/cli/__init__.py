@@ -76,14 +76,17 @@ def main() -> None:
 
 
 def _delay_garbage_collection() -> None:
-    """Delay the first garbage collection, since imported modules stay to the end.
+    """Delay the first garbage collection, and leave out of others what exists after it.
 
-    It saves 0.12 s of 1.1 s of a `semsig localize` in a small city.
+    Imported modules stay to the end. It saves 0.12 s of 1.1 s of a `semsig localize` in a small
+    city, and 0.6 s of 4 s of a `semsig build`.
     """
 
-    def restore(*_: object) -> None:
-        gc.set_threshold(*usual)
-        gc.callbacks.remove(restore)
+    def restore(phase: str, _: object) -> None:
+        if phase == "stop":
+            gc.set_threshold(*usual)
+            gc.callbacks.remove(restore)
+            gc.freeze()
 
     usual = gc.get_threshold()
     if usual[0] < FIRST_COLLECTION:

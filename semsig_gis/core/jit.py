@@ -16,9 +16,11 @@ from semsig_gis.core.resources import require_address_space
 COMPILER_BYTES = 400_000_000
 require_address_space(COMPILER_BYTES, "the compiler of number loops")
 
-# numba imports scipy.linalg if it is installed, and no kernel needs it: 0.12 s of 0.8 s at start.
+# numba imports these if they are installed, and no kernel needs them: 0.15 s of 0.8 s at start.
 # None in `sys.modules` makes that import fail.
-_hidden: dict[str, Any] = {} if "scipy.linalg" in sys.modules else {"scipy.linalg": None}
+_hidden: dict[str, Any] = {
+    name: None for name in ("scipy.linalg", "coverage") if name not in sys.modules
+}
 sys.modules.update(_hidden)
 try:
     import numba

@@ -63,7 +63,8 @@ def nearest_town(lon: float, lat: float) -> Town:
     distances = EARTH_RADIUS_KM * np.arccos(cosines)
     # Districts of a city are towns, too; the first one is the largest.
     best = int(np.argmax(distances <= distances.min() + SAME_CITY_KM))
-    return Town(*towns[best], float(distances[best]))
+    name, country = towns[best]
+    return Town(name, country, float(distances[best]))
 
 
 def town_of(xy: NDArray[np.float64], crs: CRS) -> Town:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import lazy_loader
 import numpy as np
 
-from semsig_gis.core import HEIGHT, Displayed, InputError, cell_ids, consecutive
+from semsig_gis.core import HEIGHT, Displayed, InputError, cell_ids, consecutive, share_rows
 from semsig_gis.sources import heights_in
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ TOUCHING_M = 1.0  # more than the tolerance, and than a gap between joined build
 # Added to a range: more than rounding errors, the tolerance and the gap between joined buildings.
 MARGIN_M = 2.0
 PAIRS_PER_BLOCK = 1 << 17
+SHAPES_A_PART = 256  # for a thread
 SQUARE_M, MOST_COLUMNS = 16.0, 4096  # of the raster in which places are found
 TINY = 1e-9
 POLYGON_DIMENSIONS = 2
@@ -134,8 +135,12 @@ class Footprints(Displayed):
         _, number = np.unique(block[order], return_inverse=True)
         # The union of each block of houses takes a sixth of the time of one union of all.
         blocks = np.asarray(shapely.multipolygons(self._widened[order], indices=number))
-        outlines = shapely.union_all(blocks[:, None], axis=1)
-        return _polygons_of(np.asarray(shapely.buffer(outlines, -GAP_M - self.tolerance)))
+
+        def cut_back(some: NDArray[np.object_]) -> NDArray[np.object_]:
+            outlines = shapely.union_all(some[:, None], axis=1)
+            return np.asarray(shapely.buffer(outlines, -GAP_M - self.tolerance))
+
+        return _polygons_of(_in_threads(cut_back, blocks))
 
     @functools.cached_property
     def walls(self) -> WallGrid | None:
@@ -156,8 +161,9 @@ class Footprints(Displayed):
     @functools.cached_property
     def _widened(self) -> NDArray[np.object_]:
         # Neighbours with a tiny gap would have two walls, or cause errors in GEOS.
-        widened: NDArray[np.object_] = shapely.buffer(self._polygons, GAP_M, join_style="mitre")
-        return widened
+        return _in_threads(
+            lambda some: shapely.buffer(some, GAP_M, join_style="mitre"), self._polygons
+        )
 
     def cores(self, interior: int) -> NDArray[np.object_]:
         """Return the parts of a row of `interiors` that belong to single footprints."""
@@ -205,7 +211,8 @@ def hidden(
         return np.zeros(len(starts), bool)
     # The pairs of one viewpoint follow each other, and the building around it is found once.
     first = np.ones(len(starts), bool)
-    first[1:] = (starts[1:] != starts[:-1]).any(axis=1)
+    x, y = starts.T
+    first[1:] = (x[1:] != x[:-1]) | (y[1:] != y[:-1])
     around = np.full(int(first.sum()), -1, np.int32)
     row, place = _places_in(footprints.interiors, starts[first])
     around[place] = row
@@ -222,29 +229,28 @@ def hidden(
 def _places_in(
     polygons: NDArray[np.object_], places: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the rows of prepared polygons and of places, at least one, in them or on an outline."""
-    low, high = places.min(axis=0), places.max(axis=0)
+    """Return the rows of pairs of a prepared polygon and a place in it or on its outline."""
+    x, y = places.T
+    low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
     bounds = shapely.bounds(polygons)
     met = np.flatnonzero((bounds[:, :2] <= high).all(axis=1) & (bounds[:, 2:] >= low).all(axis=1))
-    west, south, east, north = bounds[met].T
+    bounds = bounds[met]
     # In the order of squares, the places in one column of squares of a box follow each other.
     size = max(SQUARE_M, float((high - low).max()) / MOST_COLUMNS)
-    squares = np.floor(places / size).astype(np.int64)
-    ids = cell_ids(squares[:, 0], squares[:, 1])
+    ids = cell_ids(*np.floor(places / size).T)
     order = np.argsort(ids, kind="stable")
     ids = ids[order]
-    first = np.floor(np.maximum(west, low[0]) / size).astype(np.int64)
-    last = np.floor(np.minimum(east, high[0]) / size).astype(np.int64)
-    box, column = np.repeat(np.arange(len(met)), last + 1 - first), consecutive(first, last + 1 - first)
-    begin = np.searchsorted(ids, cell_ids(column, np.floor(np.maximum(south, low[1]) / size)[box]))
-    end = np.searchsorted(
-        ids, cell_ids(column, np.floor(np.minimum(north, high[1]) / size)[box]), side="right"
-    )
+    first, south = np.floor(np.maximum(bounds[:, :2], low) / size).astype(np.int64).T
+    last, north = np.floor(np.minimum(bounds[:, 2:], high) / size).astype(np.int64).T
+    box = np.repeat(np.arange(len(met)), last + 1 - first)
+    column = consecutive(first, last + 1 - first)
+    begin = np.searchsorted(ids, cell_ids(column, south[box]))
+    end = np.searchsorted(ids, cell_ids(column, north[box]), side="right")
     box, place = np.repeat(box, end - begin), order[consecutive(begin, end - begin)]
-    x, y = places[place].T
-    inside = (x >= west[box]) & (x <= east[box]) & (y >= south[box]) & (y <= north[box])
+    inside = (places[place] >= bounds[box, :2]).all(axis=1)
+    inside &= (places[place] <= bounds[box, 2:]).all(axis=1)
     row, place = met[box[inside]], place[inside]
-    inside = shapely.intersects_xy(polygons[row], *places[place].T)
+    inside = shapely.intersects_xy(polygons[row], x[place], y[place])
     return row[inside], place[inside]
 
 
@@ -398,6 +404,19 @@ def _polygons_of(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
     polygons: NDArray[np.object_] = parts[shapely.get_dimensions(parts) == POLYGON_DIMENSIONS]
     shapely.prepare(polygons)
     return polygons
+
+
+def _in_threads(
+    work: Callable[[NDArray[np.object_]], NDArray[np.object_]], shapes: NDArray[np.object_]
+) -> NDArray[np.object_]:
+    """Return ``work(shapes)``, a shape for each, computed in parallel threads."""
+    result = np.empty(len(shapes), object)
+
+    def work_on(part: NDArray[np.int64]) -> None:
+        result[slice(*part)] = work(shapes[slice(*part)])
+
+    share_rows(work_on, len(shapes), least=SHAPES_A_PART)
+    return result
 
 
 def _component_labels(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import compiled
+from semsig_gis.core import compiled, share_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -126,7 +126,13 @@ def cross_walls(
     -1 if there is none, do not count.
     """
     states = np.empty(len(starts), np.uint8)
-    _cross_walls(starts - grid.origin, ends - grid.origin, around, grid, states)
+    starts, ends = starts - grid.origin, ends - grid.origin
+
+    def cross(part: NDArray[np.int64]) -> None:
+        rows = slice(*part)
+        _cross_walls(starts[rows], ends[rows], around[rows], grid, states[rows])
+
+    share_rows(cross, len(starts))
     return states
 
 

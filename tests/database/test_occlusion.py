@@ -198,6 +198,25 @@ def test_occlusion_along_walls_and_through_corners_equals_the_oracle(seed: int) 
     assert hidden(starts, ends, footprints=footprints).tolist() == exact.tolist()
 
 
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    span=st.sampled_from([20, 300, 10**6]),
+    origin=st.sampled_from([0.0, -500.0, 6_700_000.0]),
+)
+def test_covered_places_are_in_a_footprint_or_on_its_outline(
+    seed: int, span: int, origin: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    corners = origin + rng.integers(0, span, (12, 2))
+    polygons = np.asarray(shapely.box(*corners.T, *(corners + rng.integers(1, 90, (12, 2))).T))
+    polygons[:6] = shapely.buffer(shapely.centroid(polygons[:6]), rng.uniform(1, 90, 6))
+    places = np.concatenate(
+        [origin + rng.integers(0, span, (60, 2)), shapely.get_coordinates(polygons[3:9])]
+    )
+    expected = shapely.intersects(polygons[:, None], shapely.points(places)).any(axis=0)
+    assert Footprints(polygons).cover(places).tolist() == expected.tolist()
+
+
 def test_occlusion_in_helsinki_equals_the_oracle(geodata: Path) -> None:
     spec = load_catalog("openstreetmap").layer("buildings")
     (layer,) = osm_file.read_layers(geodata / "osm/helsinki_2019.osm.pbf", [spec])
