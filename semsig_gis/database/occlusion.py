@@ -233,8 +233,8 @@ def _places_in(
     x, y = places.T
     low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
     bounds = shapely.bounds(polygons)
-    met = np.flatnonzero((bounds[:, :2] <= high).all(axis=1) & (bounds[:, 2:] >= low).all(axis=1))
-    bounds = bounds[met]
+    rows = np.flatnonzero((bounds[:, :2] <= high).all(axis=1) & (bounds[:, 2:] >= low).all(axis=1))
+    bounds = bounds[rows]
     # In the order of squares, the places in one column of squares of a box follow each other.
     size = max(SQUARE_M, float((high - low).max()) / MOST_COLUMNS)
     ids = cell_ids(*np.floor(places / size).T)
@@ -242,14 +242,14 @@ def _places_in(
     ids = ids[order]
     first, south = np.floor(np.maximum(bounds[:, :2], low) / size).astype(np.int64).T
     last, north = np.floor(np.minimum(bounds[:, 2:], high) / size).astype(np.int64).T
-    box = np.repeat(np.arange(len(met)), last + 1 - first)
+    box = np.repeat(np.arange(len(rows)), last + 1 - first)
     column = consecutive(first, last + 1 - first)
     begin = np.searchsorted(ids, cell_ids(column, south[box]))
     end = np.searchsorted(ids, cell_ids(column, north[box]), side="right")
     box, place = np.repeat(box, end - begin), order[consecutive(begin, end - begin)]
     inside = (places[place] >= bounds[box, :2]).all(axis=1)
     inside &= (places[place] <= bounds[box, 2:]).all(axis=1)
-    row, place = met[box[inside]], place[inside]
+    row, place = rows[box[inside]], place[inside]
     inside = shapely.intersects_xy(polygons[row], x[place], y[place])
     return row[inside], place[inside]
 
