@@ -12,20 +12,23 @@ from typing_extensions import TypedDict
 from semsig_gis.core import Displayed, signed_degrees
 from semsig_gis.localization.likelihood.association import score_associations
 from semsig_gis.localization.likelihood.index import own_sigma
-from semsig_gis.localization.likelihood.posterior import Refinement
+from semsig_gis.localization.likelihood.posterior import Refinement, holding
+from semsig_gis.localization.noise.table import database_tables
 from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.likelihood.posterior import Posterior
     from semsig_gis.localization.noise.model import Noise
 
-MOST_CELLS = 200
-"""Likeliest cells near the answer that are averaged; the others are negligible."""
+NEGLIGIBLE = 1e-4
+"""Share of the chance near the answer in cells that are not averaged."""
 ELLIPSE_STEPS = 72
-HEADING_STEP = 2.0  # degrees between the headings that are tried
+HEADING_STEPS = (6.0, 4.0, 3.0, 2.0)  # degrees between the headings that are tried
+STEP_DEVIATIONS = 1.5  # most deviations of the heading in a step; sums are then exact to 1e-3
 
 
 class EllipseRecord(TypedDict):
@@ -134,7 +137,7 @@ def cell_estimate(
 
     If the place may be in one of two streets, the mean is between them: it has the least mean
     squared error. The covariance includes ``step ** 2 / 12`` in each direction for the place in a
-    cell. `north_sigma` is in degrees. If the query may be `turned`, headings are tried every two
+    cell. `north_sigma` is in degrees. If the query may be `turned`, headings are tried every few
     degrees in each cell.
     """
     database, chances = posterior.database, posterior.chances
@@ -143,22 +146,22 @@ def cell_estimate(
     ends = database.columns[cell] + np.array([-reach, reach + 1])
     near = np.arange(*np.searchsorted(database.columns, ends))
     away = database.xy[near] - database.xy[cell]
-    inside = near[(np.hypot(away[:, 0], away[:, 1]) <= radius) & (chances[near] > 0)]
-    inside = inside[np.argsort(-chances[inside], kind="stable")[:MOST_CELLS]]
+    inside = near[np.hypot(away[:, 0], away[:, 1]) <= radius]
+    inside = inside[holding(chances[inside], NEGLIGIBLE)]
     headings = heading_sigmas = np.zeros(len(inside))
     view = View.of(query)
     photo = view.split()[0]
     north_sigma = own_sigma(photo, north_sigma)
     turned = turned and north_sigma > 0 and view.bearings is not None and len(view) > 0
     if turned:
-        turns = np.arange(-180.0, 180.0, HEADING_STEP)
+        turns = np.arange(-180.0, 180.0, _heading_step(database, noise, len(photo)))
         each = np.broadcast_to(turns, (len(inside), len(turns)))
         logs = score_associations(database, photo, noise, inside, turns=each)
         logs -= 0.5 * (turns / north_sigma) ** 2
         shares = np.exp(logs - np.logaddexp.reduce(logs, axis=1)[:, None])
         headings = np.degrees(np.angle(shares @ np.exp(1j * np.radians(turns))))
         off = signed_degrees(turns - headings[:, None])
-        heading_sigmas = np.sqrt((shares * off**2).sum(axis=1) + HEADING_STEP**2 / 12.0)
+        heading_sigmas = np.sqrt((shares * off**2).sum(axis=1) + HEADING_STEPS[-1] ** 2 / 12.0)
     parts = Refinement(
         cells=inside,
         places=database.xy[inside],
@@ -170,6 +173,17 @@ def cell_estimate(
         near=math.inf,
     )
     return _estimate(parts, turned=turned, refined=False)
+
+
+def _heading_step(database: SignatureDatabase, noise: Noise, objects: int) -> float:
+    """Return the widest step between headings for a photo with a number of objects."""
+    tables, _ = database_tables(database, noise)
+    sigma = min(
+        math.hypot(table.sigma.min(), math.degrees(table.position_sigma / table.ranges.max()))
+        for table in tables
+    )
+    most = STEP_DEVIATIONS * sigma / math.sqrt(objects)
+    return next((step for step in HEADING_STEPS if step <= most), HEADING_STEPS[-1])
 
 
 def refined_estimate(
