@@ -398,8 +398,9 @@ class View(Signature):
         """Return the probability of each class code for each object, shape (n, 256)."""
         if self.scores is not None:
             return self.scores
-        codes = np.full(len(self), WILDCARD) if self.codes is None else self.codes
-        return np.eye(CLASSES)[codes]
+        scores = np.zeros((len(self), CLASSES))
+        scores[np.arange(len(self)), WILDCARD if self.codes is None else self.codes] = 1.0
+        return scores
 
     def class_names(self, taxonomy: Taxonomy) -> list[str]:
         """Return what each object is said to be: a class, a family, or some classes.
@@ -408,11 +409,14 @@ class View(Signature):
         family, if they are all of its classes, or their names with "or" between them; ``unknown``
         for an object of any class.
         """
+        if self.scores is None:
+            codes = [WILDCARD] * len(self) if self.codes is None else self.codes.tolist()
+            return [taxonomy.by_code(code).name if code else UNKNOWN_NAME for code in codes]
         families: dict[frozenset[int], str] = {}
         for family in {item.family for item in taxonomy.classes} - {""}:
             families[frozenset(taxonomy.family_codes(family).tolist())] = family
         words = []
-        for row in self.class_scores():
+        for row in self.scores:
             best = np.flatnonzero(row == row.max()).tolist()
             if len(best) > 1 and WILDCARD in best:
                 best.remove(WILDCARD)

@@ -340,9 +340,14 @@ def cell_noise(noise: Noise, step: float) -> Noise:
     >>> round(cell_noise(NoiseSpec(), 10.0).position_sigma, 2)
     2.89
     """
+    return _cell_noise(noise, step)
 
+
+@lru_cache(maxsize=32)
+def _cell_noise(noise: Noise, step: float) -> Noise:
     def widened(spec: NoiseSpec) -> NoiseSpec:
-        return _moved(spec, math.hypot(spec.position_sigma, step / math.sqrt(12.0)))
+        sigma = math.hypot(spec.position_sigma, step / math.sqrt(12.0))
+        return replace(spec, position_sigma=sigma)
 
     return noise.changed(widened)
 
@@ -354,7 +359,11 @@ def place_noise(noise: Noise, step: float) -> Noise:
 
     Raises `InputError` if the position uncertainty of the model is too small to subtract from.
     """
+    return _place_noise(noise, step)
 
+
+@lru_cache(maxsize=32)
+def _place_noise(noise: Noise, step: float) -> Noise:
     def narrowed(spec: NoiseSpec) -> NoiseSpec:
         variance = spec.position_sigma**2 - step**2 / 12.0
         if variance < -ROUNDING:
@@ -363,15 +372,9 @@ def place_noise(noise: Noise, step: float) -> Noise:
                 f"index for cell_noise(noise, {step:g}), which is for queries from anywhere in "
                 "them."
             )
-        return _moved(spec, 0.0 if variance < ROUNDING else math.sqrt(variance))
+        return replace(spec, position_sigma=0.0 if variance < ROUNDING else math.sqrt(variance))
 
     return noise.changed(narrowed)
-
-
-@lru_cache(maxsize=64)
-def _moved(spec: NoiseSpec, position_sigma: float) -> NoiseSpec:
-    """Return a model with another position uncertainty."""
-    return replace(spec, position_sigma=position_sigma)
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401

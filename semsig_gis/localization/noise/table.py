@@ -324,6 +324,12 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
 
 def stack_models(tables: Sequence[NoiseTable], weights: NDArray[np.float64]) -> NoiseModels:
     """Stack the tables of a mixture as compiled kernels take them."""
+    return _stacked(tuple(tables), tuple(weights.tolist()))
+
+
+@lru_cache(maxsize=16)
+def _stacked(tables: tuple[NoiseTable, ...], weights: tuple[float, ...]) -> NoiseModels:
+    """Return `stack_models` of tables; the last ones are kept."""
 
     def stacked(name: str) -> NDArray[np.float64]:
         return np.stack([getattr(table, name) for table in tables])
