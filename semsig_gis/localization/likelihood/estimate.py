@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.noise.model import Noise
 
 NEGLIGIBLE = 1e-4
-"""Share of the chance near the answer in cells that are not averaged."""
+"""Share of the chance near the answer in cells whose headings are not averaged."""
 ELLIPSE_STEPS = 72
 HEADING_STEPS = (6.0, 4.0, 3.0, 2.0)  # degrees between the headings that are tried
 STEP_DEVIATIONS = 1.5  # most deviations of the heading in a step; sums are then exact to 1e-3
@@ -147,12 +147,12 @@ def cell_estimate(
     near = np.arange(*np.searchsorted(database.columns, ends))
     away = database.xy[near] - database.xy[cell]
     inside = near[np.hypot(away[:, 0], away[:, 1]) <= radius]
-    inside = inside[holding(chances[inside], NEGLIGIBLE)]
-    headings = heading_sigmas = np.zeros(len(inside))
     view = View.of(query)
     photo = view.split()[0]
     north_sigma = own_sigma(photo, north_sigma)
     turned = turned and north_sigma > 0 and view.bearings is not None and len(view) > 0
+    inside = inside[holding(chances[inside], NEGLIGIBLE if turned else 0.0)]
+    headings = heading_sigmas = np.zeros(len(inside))
     if turned:
         turns = np.arange(-180.0, 180.0, _heading_step(database, noise, len(photo)))
         each = np.broadcast_to(turns, (len(inside), len(turns)))
