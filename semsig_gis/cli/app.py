@@ -32,6 +32,7 @@ from semsig_gis.commands import (
     Result,
     commands,
     fields_of,
+    find_command,
     run_command,
 )
 from semsig_gis.core import InputError, installed_command_names
@@ -115,8 +116,7 @@ class _Commands(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - of typer
         if name not in self.parsed:
-            here = commands(installed=False)
-            self.parsed[name] = _typer_command(here[name] if name in here else commands()[name])
+            self.parsed[name] = _typer_command(find_command(name))
         return self.parsed[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -23,7 +23,9 @@ import typer
 from semsig_gis.core import LONG_S, duration, shortened, visible, visible_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
+
+    from rich.progress import Progress
 
     from semsig_gis.core import Table
 
@@ -251,10 +253,46 @@ def progress(
     if verbose:
         remark(f"{label} ...")
     start = time.perf_counter()
+    duration_said.clear()
+    marks: list[tuple[float, int]] = []
+    state: dict[str, Any] = {"total": None, "completed": 0, "count": ""}
+    bars: list[Progress] = []
+
+    def show() -> None:
+        bars.extend(_shown_bars(label, state, start=start, unit=unit))
+
+    def advance(completed: int, total: int) -> None:
+        left = 0.0 if duration_said.is_set() else _seconds_left(marks, completed, total)
+        if left > LONG_S:
+            duration_said.set()
+            remark(f"{label} takes {duration(left)} more")
+        count = f"{completed:,} of {total:,}" if total else f"{completed:,}"
+        state.update(total=total or None, completed=completed, count=count)
+        for bar in bars:
+            bar.update(bar.task_ids[0], **state)
+
+    patience = threading.Timer(PATIENCE_S, show)
+    patience.daemon = True
+    patience.start()
+    try:
+        yield advance
+    finally:
+        patience.cancel()
+        patience.join()
+        for bar in bars:
+            bar.stop()
+    if verbose:
+        remark(f"{label}: {time.perf_counter() - start:.1f} s")
+
+
+def _shown_bars(label: str, state: Mapping[str, Any], *, start: float, unit: str) -> list[Progress]:
+    """Show a progress bar for work since a time, and return it; none without a terminal."""
     from rich import progress as parts
     from rich.console import Console
 
     screen = Console(stderr=True)
+    if not screen.is_terminal:
+        return []
     bar = parts.Progress(
         parts.TextColumn("{task.description}"),
         parts.BarColumn(),
@@ -266,34 +304,12 @@ def progress(
         ),
         console=screen,
         transient=True,
-        disable=not screen.is_terminal,
+        get_time=time.perf_counter,
     )
-    task = bar.add_task(label, total=None, count="")
-
-    duration_said.clear()
-
-    marks: list[tuple[float, int]] = []
-
-    def advance(completed: int, total: int) -> None:
-        left = 0.0 if duration_said.is_set() else _seconds_left(marks, completed, total)
-        if left > LONG_S:
-            duration_said.set()
-            remark(f"{label} takes {duration(left)} more")
-        count = f"{completed:,} of {total:,}" if total else f"{completed:,}"
-        bar.update(task, completed=completed, total=total or None, count=count)
-
-    patience = threading.Timer(PATIENCE_S, bar.start)
-    patience.daemon = True
-    patience.start()
-    try:
-        yield advance
-    finally:
-        patience.cancel()
-        # Stopping a bar that was never shown would print an empty line.
-        if bar.live.is_started:
-            bar.stop()
-    if verbose:
-        remark(f"{label}: {time.perf_counter() - start:.1f} s")
+    bar.add_task(label, **state)
+    bar.tasks[0].start_time = start
+    bar.start()
+    return [bar]
 
 
 def _seconds_left(marks: list[tuple[float, int]], completed: int, total: int) -> float:

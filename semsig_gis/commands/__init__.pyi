@@ -14,6 +14,7 @@ from .model import command as command
 from .model import command_line as command_line
 from .model import commands as commands
 from .model import fields_of as fields_of
+from .model import find_command as find_command
 from .model import run_command as run_command
 from .options import Database as Database
 from .options import NoiseName as NoiseName

@@ -259,10 +259,10 @@ class Localize(SearchOptions, QueryOptions):
 
         The default noise is that of the query or, without a query, that of each query to come.
         """
-        from semsig_gis.localization import Method, Requirement, UsualLocator, make_locator
-
         taxonomy = city.dataset.taxonomy
         if self.ranking != LIKELIHOOD:
+            from semsig_gis.localization import Method, Requirement, make_locator
+
             require = self.require
             return make_locator(
                 city,
@@ -283,7 +283,11 @@ class Localize(SearchOptions, QueryOptions):
 
         if query is not None:
             return make(self.usual_noise(query, taxonomy))
-        return UsualLocator(make=make) if self.noise is None else make(self.noise)
+        if self.noise is not None:
+            return make(self.noise)
+        from semsig_gis.localization import UsualLocator
+
+        return UsualLocator(make=make)
 
     def with_unplaced(
         self,

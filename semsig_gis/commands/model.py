@@ -372,7 +372,8 @@ def commands(*, installed: bool = True) -> Mapping[str, Command]:
     Those of other packages are classes in the entry points ``semsig_gis.commands``, which
     `command` decorates; they are imported only if `installed`.
     """
-    _import_commands()
+    for module in _modules():
+        importlib.import_module(module)
     if installed:
         _import_installed_commands()
     ordered = sorted(
@@ -381,11 +382,24 @@ def commands(*, installed: bool = True) -> Mapping[str, Command]:
     return {item.name: item for item in ordered}
 
 
+def find_command(name: str) -> Command:
+    """Return a command by its name, also one of another package; KeyError for an unknown name.
+
+    Of this package, only the module is imported that is called like the command.
+    """
+    for module in _modules():
+        if module.endswith((f".{name}", f".{name}_")):
+            importlib.import_module(module)
+    return _COMMANDS[name] if name in _COMMANDS else commands()[name]
+
+
 @functools.cache
-def _import_commands() -> None:
+def _modules() -> list[str]:
+    """Return the modules of this package."""
     package = importlib.import_module("semsig_gis.commands")
-    for module in pkgutil.iter_modules(package.__path__):
-        importlib.import_module(f"{package.__name__}.{module.name}")
+    return [
+        f"{package.__name__}.{module.name}" for module in pkgutil.iter_modules(package.__path__)
+    ]
 
 
 @functools.cache

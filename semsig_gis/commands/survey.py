@@ -9,7 +9,6 @@ from typing import Annotated
 from semsig_gis.commands.build import Radius
 from semsig_gis.commands.load import Catalogs, Crs, Files
 from semsig_gis.commands.model import Option, Reporter, Result, command
-from semsig_gis.database import SurveyRecord
 
 
 @command(
@@ -17,7 +16,7 @@ from semsig_gis.database import SurveyRecord
     title="Survey a place's data",
     group="Prepare",
     order=5,
-    returns=SurveyRecord,
+    returns="semsig_gis.database:SurveyRecord",
     examples=(
         "semsig survey monaco.osm.pbf",
         "semsig survey trees.geojson --catalog city.toml --area 7.41,43.73,7.42,43.74",

@@ -16,11 +16,10 @@ from semsig_gis.core.resources import require_address_space
 COMPILER_BYTES = 400_000_000
 require_address_space(COMPILER_BYTES, "the compiler of number loops")
 
-# numba imports these if they are installed, and no kernel needs them: 0.15 s of 0.8 s at start.
-# None in `sys.modules` makes that import fail.
-_hidden: dict[str, Any] = {
-    name: None for name in ("scipy.linalg", "coverage") if name not in sys.modules
-}
+# numba imports these if they are installed, and no kernel needs them: 0.16 s of 0.8 s at start.
+# None in `sys.modules` makes such an import fail.
+_unneeded = {"scipy.linalg", "coverage", "yaml"}
+_hidden: dict[str, Any] = dict.fromkeys(_unneeded.difference(sys.modules))
 sys.modules.update(_hidden)
 try:
     import numba

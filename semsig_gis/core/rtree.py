@@ -11,18 +11,20 @@ import threading
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import lazy_loader
 import numpy as np
-import shapely
-from rtree import index as rtree_index
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import consecutive
 from semsig_gis.core.threads import share_rows
 
 if TYPE_CHECKING:
+    import shapely
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.core.point_grid import PointGrid
+else:
+    shapely = lazy_loader.load("shapely")
 
 # More than the rounding error of a coordinate anywhere on Earth.
 ROUNDING_M = 1e-6
@@ -59,6 +61,8 @@ class ObjectIndex:
         # Query the tree once for each square, with a box that contains all circles around it.
         corners, square = np.unique(np.floor(places / side) * side, axis=0, return_inverse=True)
         if not hasattr(self._own, "tree"):
+            from rtree import index as rtree_index  # noqa: PLC0415 - only for these queries
+
             self._own.tree = rtree_index.Index((np.arange(len(self._xy)), self._xy, self._xy))
         points, counts = self._own.tree.intersection_v(corners - reach, corners + (reach + side))
         # Repeat the points of a square for each of its viewpoints.

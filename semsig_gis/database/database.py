@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import lazy_loader
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from pyproj import CRS
 
 from semsig_gis import __version__
@@ -534,4 +533,6 @@ def _joined(
     entries = pa.array(values[offsets[0] : offsets[-1]])
     starts = pa.array((offsets - offsets[0]).astype(np.int32))
     lists = pa.ListArray.from_arrays(starts, texts.take(entries))
-    return pc.binary_join(lists, separator)
+    from pyarrow.compute import binary_join  # noqa: PLC0415 - slow, and rarely needed
+
+    return binary_join(lists, separator)

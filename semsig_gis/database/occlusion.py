@@ -12,7 +12,6 @@ import lazy_loader
 import numpy as np
 
 from semsig_gis.core import HEIGHT, Displayed, InputError, cell_ids, consecutive, share_rows
-from semsig_gis.sources import heights_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -362,6 +361,8 @@ def building_heights(buildings: gpd.GeoDataFrame) -> NDArray[np.float64] | None:
     """
     if HEIGHT not in buildings:
         return None
+    from semsig_gis.sources import heights_in  # noqa: PLC0415 - slow, and rarely needed
+
     return heights_in(buildings[HEIGHT].to_numpy()).astype(np.float32).astype(np.float64)
 
 

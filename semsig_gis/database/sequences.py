@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from semsig_gis.core import InputError
 from semsig_gis.storage import whole_numbers
@@ -45,6 +44,8 @@ class SequenceTable:
         Row ``i`` is ``values[offsets[i]:offsets[i + 1]]``; the arrays are copied. Raise InputError
         if the values are not bytes, or the offsets do not divide them.
         """
+        from pyarrow.compute import binary_length  # noqa: PLC0415 - slow, and rarely needed
+
         flat = np.ascontiguousarray(checked_sequence(values))
         ends = np.ascontiguousarray(offsets, dtype=np.int64)
         complete = ends.ndim == 1 and len(ends) > 0 and ends[0] == 0 and ends[-1] == len(flat)
@@ -61,7 +62,7 @@ class SequenceTable:
         # Arrow numbers the sequences by first appearance; here the short ones come first.
         encoded = rows.dictionary_encode()
         distinct = len(encoded.dictionary)
-        lengths = whole_numbers(pc.binary_length(encoded.dictionary))
+        lengths = whole_numbers(binary_length(encoded.dictionary))
         order = np.argsort(lengths, kind="stable")
         rank = np.empty(distinct, np.int64)
         rank[order] = np.arange(distinct)

@@ -15,11 +15,10 @@ import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
+import lazy_loader
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
-import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
@@ -30,7 +29,10 @@ from semsig_gis.storage.whole import reason, whole_file
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
+    import shapely
     from numpy.typing import ArrayLike, NDArray
+else:
+    shapely = lazy_loader.load("shapely")
 
 
 BBOX = "bbox"
@@ -188,7 +190,9 @@ def texts_of(column: pa.ChunkedArray) -> pa.ChunkedArray:
         column = column.cast(pa.string())
     if not column.null_count or not _IS_KIND["text"](column.type):
         return column  # without `fill_null`, which loads pandas
-    return pc.fill_null(column, "")
+    from pyarrow.compute import fill_null  # noqa: PLC0415 - slow, and rarely needed
+
+    return fill_null(column, "")
 
 
 SPEC_KEY = b"semsig"
