@@ -179,7 +179,10 @@ def open_database(path: str | Path) -> SignatureDatabase:
         return join_databases([open_database(part) for part in part_files(path)])
     columns = ["cell_id", "types", "bearings", "distances"]
     table, specs, crs = read_geoparquet(path, kind=KIND, columns=columns, optional=[EXTENTS])
-    return database_of(table, specs, crs, path=path)
+    database = database_of(table, specs, crs, path=path)
+    del table
+    pa.default_memory_pool().release_unused()
+    return database
 
 
 def database_of(
