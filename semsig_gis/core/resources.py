@@ -9,8 +9,6 @@ import sys
 import warnings
 from pathlib import Path
 
-import psutil
-
 from semsig_gis.core.errors import InputError
 
 if sys.platform != "win32":
@@ -34,6 +32,8 @@ MEMORY_MESSAGES = tuple(os.strerror(number) for number in (errno.ENOMEM, errno.E
 
 def free_memory() -> int:
     """Return the number of bytes that this process may still allocate."""
+    import psutil  # noqa: PLC0415 - 10 ms, and rarely needed
+
     free = [psutil.virtual_memory().available]
     for usage, limit in CGROUP_FILES:
         with contextlib.suppress(OSError, ValueError):  # without a limit, the file contains "max"
@@ -61,6 +61,8 @@ def free_address_space() -> int | None:
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
         return None
+    import psutil  # noqa: PLC0415 - as above
+
     size: int = psutil.Process().memory_info().vms
     return limit - size
 

@@ -18,8 +18,6 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import filelock
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -97,6 +95,8 @@ def _lock_abandoned(folder: Path) -> int | None:
 
 def locked(file: int, *, wait: bool) -> bool:
     """Lock an open file or folder until it is closed; return False if that is impossible."""
+    import filelock  # noqa: PLC0415 - 8 ms, and most commands lock nothing
+
     try:
         return filelock.lock_descriptor(file, blocking=wait)
     except OSError:
@@ -208,6 +208,8 @@ def _lock_folder(folder: Path, target: Path) -> int | None:
 
 def _locked_in_time(lock: int, path: Path, target: Path) -> bool:
     """Lock an open file as `locked` does; after a few seconds, warn which process has it."""
+    import filelock  # noqa: PLC0415 - as above
+
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         try:

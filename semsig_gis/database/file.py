@@ -275,7 +275,8 @@ def _numbers(column: pa.ChunkedArray, kind: pa.DataType) -> tuple[NDArray[Any], 
     """Return the flat array and offsets of an Arrow column of lists of numbers."""
     array = _as_array(column, pa.list_(kind))
     offsets = whole_numbers(array.offsets).astype(np.int64)
-    return whole_numbers(array.flatten()), offsets - offsets[0]
+    values = whole_numbers(array.values)  # `flatten` would load all of pyarrow.compute
+    return values[offsets[0] : offsets[-1]], offsets - offsets[0]
 
 
 def _as_array(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
