@@ -20,7 +20,6 @@ import lazy_loader
 import numpy as np
 
 from semsig_gis import __version__
-from semsig_gis import objects as street_objects
 from semsig_gis.core import (
     HALF_WIDTH,
     HEIGHT,
@@ -46,6 +45,7 @@ from semsig_gis.database.file import (
 from semsig_gis.database.occlusion import TOLERANCE_M, NearbyFootprints, building_heights
 from semsig_gis.database.place_names import FAR_M, PlaceNames
 from semsig_gis.database.viewpoints import reproject, select_elements
+from semsig_gis.objects import licenses_of, open_objects, save_objects
 from semsig_gis.storage import (
     EMPTY_BOX,
     UNREADABLE,
@@ -155,7 +155,7 @@ class ObjectStore(Displayed):
     @property
     def ground_licenses(self) -> tuple[str, ...]:
         """Attribution and licence of the buildings and streets."""
-        return street_objects.licenses_of(self.footprints, self.streets)
+        return licenses_of(self.footprints, self.streets)
 
     def ground_around(self, xy: NDArray[np.float64]) -> dict[str, Any]:
         """Return the arguments of `ground_map` around places, (n, 2); empty without any ground."""
@@ -222,7 +222,7 @@ def _stored(table: gpd.GeoDataFrame, crs: CRS, *names: str) -> gpd.GeoDataFrame:
     if (heights := building_heights(rows)) is not None and HEIGHT in columns:
         columns[HEIGHT] = heights.astype(np.float32)
     stored = gpd.GeoDataFrame(columns, geometry=rows.geometry.to_numpy(), crs=rows.crs)
-    stored.attrs[LICENSES] = list(street_objects.licenses_of(table))
+    stored.attrs[LICENSES] = list(licenses_of(table))
     return stored
 
 
@@ -429,7 +429,7 @@ def _read(folder: Path, database: Path) -> ObjectStore:
     if lacking:
         raise DatabaseError(f"{folder} {lacking}")
     return ObjectStore(
-        objects=street_objects.open_objects(folder / OBJECTS),
+        objects=open_objects(folder / OBJECTS),
         footprints=_read_shapes(folder / FOOTPRINTS) if FOOTPRINTS in names else None,
         streets=_read_shapes(folder / STREETS) if STREETS in names else None,
     )
@@ -470,7 +470,7 @@ def _read_inputs(folder: Path) -> ObjectStore:
             f"{folder / INPUTS / min(changed)} is not what the database was built from; build the "
             "database again."
         )
-    objects = street_objects.open_objects(files.pop("objects"))
+    objects = open_objects(files.pop("objects"))
     houses, lines = _read_ground(files, objects.crs)
     return ObjectStore.of(objects, footprints=houses, streets=lines)
 
@@ -478,8 +478,8 @@ def _read_inputs(folder: Path) -> ObjectStore:
 def ground_licenses(folder: Path) -> tuple[str, ...]:
     """Return the attribution and licence of the buildings and streets of a database in parts."""
     files = stored_inputs(folder)
-    crs = street_objects.open_objects(files.pop("objects"), box=EMPTY_BOX).crs
-    return street_objects.licenses_of(*_read_ground(files, crs, EMPTY_BOX))
+    crs = open_objects(files.pop("objects"), box=EMPTY_BOX).crs
+    return licenses_of(*_read_ground(files, crs, EMPTY_BOX))
 
 
 def names_in(folder: Path, square: tuple[int, int]) -> PlaceNames:
@@ -488,7 +488,7 @@ def names_in(folder: Path, square: tuple[int, int]) -> PlaceNames:
     The square of `SQUARE_M` is numbered by its column and row from the origin of the CRS.
     """
     files = stored_inputs(folder)
-    crs = street_objects.open_objects(files.pop("objects"), box=EMPTY_BOX).crs
+    crs = open_objects(files.pop("objects"), box=EMPTY_BOX).crs
     west, south = (SQUARE_M * number for number in square)
     east, north = west + SQUARE_M + FAR_M, south + SQUARE_M + FAR_M
     houses, lines = _read_ground(files, crs, (west - FAR_M, south - FAR_M, east, north))
@@ -521,7 +521,7 @@ def _read_shapes(path: Path) -> gpd.GeoDataFrame:
 def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
     """Write a store to a folder, which appears complete and replaces another."""
     with whole_folder(folder) as partial:
-        street_objects.save_objects(store.objects, partial / OBJECTS, keep_order=True)
+        save_objects(store.objects, partial / OBJECTS, keep_order=True)
         for name, table in ((FOOTPRINTS, store.footprints), (STREETS, store.streets)):
             if table is not None:
                 table.to_parquet(partial / name, compression="zstd")

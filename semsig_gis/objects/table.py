@@ -9,10 +9,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import lazy_loader
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
-import shapely
 
 from semsig_gis import __version__
 from semsig_gis.core import (
@@ -61,12 +60,15 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
     import pandas as pd
+    import shapely
     from numpy.typing import NDArray
     from pyproj import CRS
 
     from semsig_gis.core import Axes, MapFrame
     from semsig_gis.sources import RawLayer
     from semsig_gis.storage import ColumnKind
+else:
+    shapely = lazy_loader.load("shapely")
 
 KIND = "street objects"
 # Columns without the geometry, and their types.
@@ -304,6 +306,8 @@ def without_empty(arrow: pa.Table) -> pa.Table:
 
 
 def _has_value(column: pa.ChunkedArray, nothing: object) -> bool:
+    import pyarrow.compute as pc  # noqa: PLC0415 - slow, and not needed to read objects
+
     if pa.types.is_floating(column.type):
         return not bool(pc.all(pc.is_null(column, nan_is_null=True)).as_py())
     return bool(pc.any(pc.not_equal(column, nothing)).as_py())
@@ -535,7 +539,7 @@ def _checked(arrow: pa.Table) -> pa.Table:
         for name in names
     }
     require_kinds(arrow, kinds, may_lack=[HEIGHT])
-    counts = pc.min_max(arrow[COUNT]).as_py()
-    if len(arrow) and not 1 <= counts["min"] <= counts["max"] <= np.iinfo(np.int32).max:
-        raise ValueError(f"its column {COUNT} has numbers from {counts['min']} to {counts['max']}")
+    counts = whole_numbers(arrow[COUNT])
+    if len(arrow) and not 1 <= counts.min() <= counts.max() <= np.iinfo(np.int32).max:
+        raise ValueError(f"its column {COUNT} has numbers from {counts.min()} to {counts.max()}")
     return arrow

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 LEAST_LOG = -700.0  # its exponential is above 0
 ROUNDING = 1e-3  # of a sum of chances in a file of float32
+NO_CHANCE = 1e-16  # smaller ones add less than 1e-9 bits to the entropy of a large city
 LIKELIEST_CELLS = 1000
 """Cells among which the best place is searched."""
 LEAST_POWER = -1100  # of two; smaller numbers are 0
@@ -112,7 +113,7 @@ class Posterior(Displayed):
     @property
     def entropy(self) -> float:
         """How uncertain the cell is, in bits: 0 for one cell, 1 for two equally likely, ..."""
-        chances = self.chances[self.chances > 0]
+        chances = self.chances[self.chances > NO_CHANCE]
         return float(-(chances * np.log2(chances)).sum())
 
     def credible_cells(self, share: float = 0.9) -> NDArray[np.int64]:
