@@ -49,6 +49,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
         lambda _: _crossing(starts, ends, polygons),
         peer_name="shapely.STRtree of the footprints, lines that cross any",
         repeats=1,
+        bar=6.0,
     )
     mean = len(starts) / len(viewpoints)
     yield Comparison(
