@@ -8,6 +8,8 @@ import functools
 import json
 import os
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +19,7 @@ from sentences import sentence
 
 import semsig_gis.cli.app  # noqa: F401 - with the command of the workbench
 from semsig_gis.cli.console import PIPED_WIDTH
-from semsig_gis.commands import Result, command_line, commands
+from semsig_gis.commands import Result, command_line, commands, find_command
 from semsig_gis.commands.schema import command_schema
 from semsig_gis.evaluation.identifiability import analysis
 
@@ -132,6 +134,23 @@ def test_every_command_has_a_use_here() -> None:
 
 
 @pytest.mark.usefixtures("unchanged")
+def test_a_command_is_in_the_module_of_its_name() -> None:
+    code = (
+        "import sys\n"
+        "from semsig_gis.commands import find_command\n"
+        "for name in sys.argv[1:]:\n"
+        "    print(find_command(name).name)\n"
+        "    others = [module for module in sys.modules if module.endswith('commands.survey')]\n"
+        "    assert not others, others\n"
+    )
+    names = [name for name in COMMANDS if name not in {"serve", "survey"}]
+    command = [sys.executable, "-c", code, *names]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert run.stdout.split() == names
+    with pytest.raises(KeyError):
+        find_command("nonsense")
+
+
 @pytest.mark.parametrize(("name", "field"), fields(lambda field: field.option.reads))
 def test_missing_file_is_refused(name: str, field: Field, run: Run) -> None:
     changes, words = OTHERS.get((name, field.name), ({}, "nowhere.parquet"))
