@@ -33,8 +33,8 @@ def measure_clockwise(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywo
 ) -> None:
     """Order the `objects` around the places ``part[0]`` to ``part[1] - 1``, and measure them.
 
-    The objects of a place are ``offsets[place] : offsets[place + 1]``, in any order; `ordered` are
-    those by bearing, distance and class code, with their `bearings` and `distances`.
+    The objects of a place are ``offsets[place] : offsets[place + 1]``; `ordered` are those by
+    bearing, distance and class code, equal ones in their order, with `bearings` and `distances`.
     """
     keys, order = np.empty(0, np.int64), np.empty(_FEW, np.int64)
     for place in range(part[0], part[1]):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.noise.model import Noise
 
 NEGLIGIBLE = 1e-4
-"""Share of the chance near the answer in cells whose headings are not averaged."""
+"""Share of the chance near the answer in cells that are left out of a mean heading."""
 ELLIPSE_STEPS = 72
 HEADING_STEPS = (6.0, 4.0, 3.0, 2.0)  # degrees between the headings that are tried
 STEP_DEVIATIONS = 1.5  # most deviations of the heading in a step; sums are then exact to 1e-3
