@@ -48,6 +48,8 @@ _KINDS: dict[str, tuple[SeenFrom, str, float]] = {
     "north unknown": ("anywhere", "view:360, compass:360", math.inf),
 }
 _NEAR_M, _NEAR_CHANCE = 1.0, 0.01
+_LEAST_CHANCE = 0.1  # of a place that is likely
+_LIKELY = f"chance of {_LEAST_CHANCE:g} or more"
 
 
 def main() -> None:
@@ -128,27 +130,27 @@ def _compare(old: Path, new: Path) -> None:
     counts: Counter[tuple[str, str]] = Counter()
     for view in before.keys() & after.keys():
         was, now = before[view], after[view]
-        away = math.dist(was["xy"], now["xy"])
-        changes = {name: abs(was[name] - now[name]) for name in ("chance", "elsewhere")}
         facts = {
-            "views": True,
-            "place": away <= _NEAR_M,
-            "chance": max(changes.values()) <= _NEAR_CHANCE,
+            "place": math.dist(was["xy"], now["xy"]) <= _NEAR_M,
+            "chance": abs(was["chance"] - now["chance"]) <= _NEAR_CHANCE,
+            "elsewhere": abs(was["elsewhere"] - now["elsewhere"]) <= _NEAR_CHANCE,
         }
-        for kind in (view[1], "all"):
-            counts.update((kind, fact) for fact, holds in facts.items() if holds)
-        if not all(facts.values()):
+        groups = (view[1], "all", *([_LIKELY] if was["chance"] >= _LEAST_CHANCE else []))
+        for group in groups:
+            counts.update((group, fact) for fact, holds in facts.items() if holds)
+            counts[group, "views"] += 1
+        if not (facts["place"] and facts["chance"]):
             print(
-                f"{view}: {was['objects']} objects, {away:.1f} m, chance {was['chance']:.3f} "
-                f"{now['chance']:.3f}, elsewhere {was['elsewhere']:.3f} {now['elsewhere']:.3f}"
+                f"{view}: {was['objects']} objects, {math.dist(was['xy'], now['xy']):.1f} m, "
+                f"chance {was['chance']:.3f} {now['chance']:.3f}"
             )
-    for kind in (*_KINDS, "all"):
-        views, places, chances = (counts[kind, fact] for fact in ("views", "place", "chance"))
-        if views:
-            print(
-                f"{kind}: {views} answers, the same place {places / views:.1%}, "
-                f"the same chance {chances / views:.1%}"
+    for group in (*_KINDS, _LIKELY, "all"):
+        if views := counts[group, "views"]:
+            shares = (
+                f"{what} {counts[group, what] / views:.1%}"
+                for what in ("place", "chance", "elsewhere")
             )
+            print(f"{group}: of {views} answers, the same {', '.join(shares)}")
 
 
 if __name__ == "__main__":

@@ -83,6 +83,7 @@ from .inputs import number as number
 from .inputs import pairs as pairs
 from .inputs import read_table as read_table
 from .jit import compiled as compiled
+from .jit import compiled_sums as compiled_sums
 from .links import place_links as place_links
 from .parallel import Outcome as Outcome
 from .parallel import check_workers as check_workers
@@ -127,6 +128,7 @@ from .signature import wrapped_bearings as wrapped_bearings
 from .statistics import binomial_tail as binomial_tail
 from .statistics import fit_shares as fit_shares
 from .statistics import log_interval as log_interval
+from .statistics import log_sum as log_sum
 from .statistics import poisson_interval as poisson_interval
 from .statistics import quantile_ranks as quantile_ranks
 from .statistics import wilson_interval as wilson_interval

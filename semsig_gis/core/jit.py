@@ -60,7 +60,16 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     processes in the folder of the module, or else in the user's cache folder; if neither can be
     written, it is compiled again in each process.
     """
-    kernel: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    return _compiled(function)
+
+
+def compiled_sums(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile a function as `compiled`; numbers are added in any order, so that sums vectorize."""
+    return _compiled(function, fastmath={"reassoc", "contract", "nsz"})
+
+
+def _compiled(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:  # noqa: ANN401 - numba's
+    kernel: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
     with contextlib.suppress(RuntimeError):  # no folder for the code can be written
         # The same as `cache=True`, but with the class above.
         kernel._cache = _CodeCache(function)  # type: ignore[no-untyped-call] # noqa: SLF001

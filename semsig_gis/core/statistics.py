@@ -96,6 +96,14 @@ def binomial_tail(hits: int, trials: int, chance: float) -> float:
     return min(math.fsum(probabilities), 1.0)
 
 
+def log_sum(logs: NDArray[np.floating]) -> float:
+    """Return the logarithm of the sum of numbers, given their logarithms; -inf for none."""
+    top = float(logs.max(initial=-math.inf))
+    if math.isinf(top):
+        return top
+    return top + math.log(float(np.exp(logs - top).sum()))
+
+
 def _deviations(percent: float) -> float:
     """Return half the width of an interval, in standard deviations."""
     if not 0.0 < percent < 100.0:  # noqa: PLR2004

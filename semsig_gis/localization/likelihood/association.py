@@ -16,14 +16,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, signed_degrees
+from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, log_sum, signed_degrees
 from semsig_gis.database import visible_objects_in
 from semsig_gis.localization.likelihood.index import CellScores, own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
+from semsig_gis.localization.likelihood.turns import turn_logs
 from semsig_gis.localization.noise.table import database_tables, extent_sigma
 from semsig_gis.observation import View
 
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Signature
     from semsig_gis.database import SignatureDatabase, VisibleObjects
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization.likelihood.index import LikelihoodIndex, _Models
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.noise.table import NoiseTable
 
@@ -47,14 +48,6 @@ FARTHEST = 8.0  # deviations, beyond which a normal distribution is over
 ROOT = math.sqrt(2.0 * math.pi)
 # Without BLAS: on a busy machine its threads wait long for each other.
 sum_products = partial(np.einsum, optimize=False)
-
-
-def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
-    """Return the log of the chance of each turn, which is one `step` wide; all are in degrees."""
-    if math.isinf(north_sigma):
-        return np.full(turns.shape, math.log(step / 360.0))
-    scale = math.log(step / (north_sigma * math.sqrt(2.0 * math.pi)))
-    return np.asarray(scale - 0.5 * (signed_degrees(turns) / north_sigma) ** 2)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -307,14 +300,15 @@ def associate_pairs(
 
 RERANKED = 500
 """Default number of cells that are re-ranked."""
-FIRST_RERANKED = 100  # always re-ranked; then as many again, twice as many, ...
+CHOSEN_FROM = 8192  # cells of which those to re-rank are chosen
+# Cells in the first batch of each; then as many again, twice as many, ...
+FIRST_CHOSEN, FIRST_RERANKED = 256, 32
 # Points in the other cells at which a sample of these is scored: usually, and for a quick answer.
-SAMPLE, QUICK_SAMPLE = 2304, 768
-# Cells that are scored off their centres first, to choose the others: at most, at least, and the
-# sample of the rest.
-OFF_CENTRE, FIRST_OFF_CENTRE, SAMPLE_OFF_CENTRE = 8192, 2048, 1024
-# Re-ranking ends when the last batch of cells holds less than this share of the chance.
+SAMPLE, QUICK_SAMPLE = 4608, 768
+# Batches end when the last one holds less than this share of the chance. Other cells that together
+# hold less are not sampled.
 LOG_LEAST_SHARE = math.log(1e-3)
+MARGIN = 20.0  # nats below the best cell at which an upper bound of a score is enough
 NEGLIGIBLE = 30.0  # nats below the best re-ranked cell at which all cells together are negligible
 POOL = 16  # the sample is drawn from this multiple of its size
 WINDOWS = 8  # ranges of the likelihood, each with a shift of its own
@@ -362,117 +356,134 @@ def rerank(
     they are. For queries from anywhere in a cell, points `off_centre` are scored: four in each of
     some thousand cells by the plain sum, to choose the cells, and then nine in each chosen cell.
     """
+    from semsig_gis.localization.likelihood.choice import quick_scorer  # noqa: PLC0415 - numba, 0.25 s
+    from semsig_gis.localization.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba, 0.25 s
+
     if count < 1:
         raise InputError(f"the number of cells to re-rank is {count}; give a whole number from 1.")
     view = View.of(query)
     if view.bearings is None:
         return scores
-    loglik = scores.loglik.astype(np.float64)
-    if off_centre and len(index.observer_offsets[1]) > 1:
-        scorer = index.off_centre_scorer(view, north_sigma=north_sigma)
-        loglik, _, _ = _replace_best(
-            lambda cells: (scorer(cells), []),
-            loglik,
-            log_prior,
-            count=OFF_CENTRE,
-            first=FIRST_OFF_CENTRE,
-            sample=SAMPLE_OFF_CENTRE,
-        )
-    loglik, cells, turns = _replace_best(
-        partial(
-            _score_cells, index, view, scores=scores, north_sigma=north_sigma, off_centre=off_centre
-        ),
-        loglik,
-        log_prior,
-        count=count,
-        first=FIRST_RERANKED,
-        sample=sample // (len(index.observer_offsets[1]) if off_centre else 1),
+    prior = np.zeros(len(scores.loglik)) if log_prior is None else log_prior
+    total = scores.loglik + prior
+    rank = partial(_score_cells, index, view, scores=scores, north_sigma=north_sigma)
+    centre = np.zeros((1, 2))
+    models, points = index.observer_offsets if off_centre else (index.models, centre)
+
+    def exact(cells: NDArray[np.int64], reached: float = -math.inf) -> _Ranks:
+        return rank(cells, models=models, points=points, least=reached - MARGIN)
+
+    quick = quick_scorer(index, view, scores, north_sigma=north_sigma)
+    chosen = promising_cells(total.astype(np.float32), min(CHOSEN_FROM, len(total)))
+    chosen = chosen[total[chosen] > -np.inf]
+    nearer = _rank_best(
+        lambda cells, reached: (quick(cells, reached - MARGIN - prior[cells]), []),
+        chosen,
+        total[chosen],
+        prior,
+        count=CHOSEN_FROM,
+        first=FIRST_CHOSEN,
+        bounds=True,
     )
+    chosen, before, move = nearer.cells, nearer.after, nearer.move
+    ranked = _rank_best(exact, chosen, before, prior, count=count, first=FIRST_RERANKED)
+    move += ranked.move
+    # The other cells change by as much as a sample of them.
+    loglik, reached = scores.loglik + np.float64(move), log_sum(ranked.after)
+    left = np.ones(len(chosen), np.bool_)
+    left[ranked.order] = False
+    live = total > min(ranked.after.max(), total.max()) - NEGLIGIBLE
+    live[chosen] = False
+    rest = np.flatnonzero(live)
+    for cells, old, change in ((chosen[left], before[left], ranked.move), (rest, total[rest], move)):
+        changes: NDArray[np.float64] | float = change
+        if len(cells) and log_sum(old) + change > reached + LOG_LEAST_SHARE:
+            changes = _changes(
+                lambda part: exact(part)[0] + prior[part], cells, old, size=sample // len(points)
+            )
+        loglik[cells] = old + changes - prior[cells]
+    loglik[ranked.cells] = ranked.after - prior[ranked.cells]
     headings = []
-    for before, turn in zip(scores.headings, turns, strict=True):
-        heading = before
-        if before is not None:
-            heading = before.copy()
-            heading[cells] = signed_degrees(turn)
-        headings.append(heading)
+    for heading, turn in zip(scores.headings, ranked.turns, strict=True):
+        if heading is None:
+            headings.append(None)
+            continue
+        headings.append(heading.copy())
+        headings[-1][ranked.cells] = signed_degrees(turn)
     return CellScores(loglik=loglik, headings=tuple(headings))
 
 
-def _replace_best(
-    rank: Callable[[NDArray[np.int64]], _Ranks],
-    old: NDArray[np.float64],
-    log_prior: NDArray[np.float64] | None,
+class _Ranked(NamedTuple):
+    """Cells that were scored again, of those that were given.
+
+    `order` has their positions among these, `before` and `after` their log-likelihoods with the
+    prior, `turns` the turns of each photo, and `move` is the change of the last batch.
+    """
+
+    cells: NDArray[np.int64]
+    order: NDArray[np.int64]
+    after: NDArray[np.float64]
+    turns: list[NDArray[np.float64]]
+    move: float
+
+
+def _rank_best(
+    rank: Callable[[NDArray[np.int64], float], _Ranks],
+    cells: NDArray[np.int64],
+    before: NDArray[np.float64],
+    prior: NDArray[np.float64],
     *,
     count: int,
     first: int,
-    sample: int,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], list[NDArray[np.float64]]]:
-    """Return better log-likelihoods of all cells, the best cells, and their turns.
+    bounds: bool = False,
+) -> _Ranked:
+    """Score the best of some cells again: the `first` of them, then more and more up to `count`.
 
-    `rank` returns log-likelihoods and turns of cells: it is called for the `first` cells, then for
-    more and more up to `count`. The others are shifted by a `sample` of them.
+    `rank` returns log-likelihoods and turns of cells; `before` is their score with the prior. If
+    these are upper `bounds`, the end is where the other cells are negligible, and otherwise where
+    the last batch is.
     """
-    from semsig_gis.localization.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba, 0.25 s
-
-    total = old if log_prior is None else old + log_prior
-    count = min(count, len(old))
-    cells = promising_cells(total.astype(np.float32), count)
-    cells = cells[np.argsort(-total[cells], kind="stable")][:count]
-    cells = cells[total[cells] > -np.inf]
-    parts, size = [rank(cells[:first])], min(first, len(cells))
-    while size < len(cells):
-        logs = np.concatenate([part for part, _ in parts])
-        if log_prior is not None:
-            logs += log_prior[cells[:size]]
-        last = logs[-len(parts[-1][0]) :]
-        if np.logaddexp.reduce(last) < np.logaddexp.reduce(logs) + LOG_LEAST_SHARE:
+    order = np.argsort(-before, kind="stable")[:count]
+    after, turns, size, move, best = np.empty(0), [], 0, 0.0, -math.inf
+    while size < len(order):
+        batch = order[size : max(first, 2 * size)]
+        part = cells[batch]
+        scores, own_turns = rank(part, best)
+        scores = scores + prior[part]
+        after, size = np.append(after, scores), size + len(part)
+        turns.append(own_turns)
+        reached, best = log_sum(scores), max(best, scores.max())
+        move = float(reached - log_sum(before[batch]))
+        others = before[order[size:]] if bounds else scores
+        if size > first and log_sum(others) < log_sum(after) + LOG_LEAST_SHARE:
             break
-        parts.append(rank(cells[size : 2 * size]))
-        size = min(2 * size, len(cells))
-    cells, new = cells[:size], np.concatenate([part for part, _ in parts])
-    turns = [np.concatenate(each) for each in zip(*(turn for _, turn in parts), strict=True)]
-    loglik = old.copy()
-    if len(cells) < len(old):
-        # The best re-ranked cell may be far below the first scores of the others.
-        best = (new if log_prior is None else new + log_prior[cells]).max()
-        rest = total > min(best, total.max()) - NEGLIGIBLE
-        rest[cells] = False
-        _shift(loglik, lambda cells: rank(cells)[0], total, np.flatnonzero(rest), sample)
-    loglik[cells] = new
-    return loglik, cells, turns
+    joined = [np.concatenate(each) for each in zip(*turns, strict=True)]
+    return _Ranked(cells[order[:size]], order[:size], after, joined, move)
 
 
-def _shift(
-    loglik: NDArray[np.float64],
+def _changes(
     rank: Callable[[NDArray[np.int64]], NDArray[np.float64]],
-    total: NDArray[np.float64],
-    tail: NDArray[np.int64],
+    cells: NDArray[np.int64],
+    before: NDArray[np.float64],
+    *,
     size: int,
-) -> None:
-    """Shift the log-likelihood of all cells as much as it changes for a sample of the `tail`.
+) -> NDArray[np.float64]:
+    """Return how much the scores of some cells change, by a sample of `size` of them.
 
-    `rank` returns the new likelihood of cells, `total` is the old one of all cells with the prior;
-    `size` is that of the sample.
+    `rank` returns the new scores of cells, and `before` are the old ones, both with the prior.
     """
-    if not len(tail):
-        return
-    pool = tail
-    if len(tail) > POOL * size:
-        random = np.random.default_rng(0)
-        pool = random.choice(tail, POOL * size, replace=False, shuffle=False)
     # More of the likely cells than of the others, and the change of the chance by window.
-    pool = pool[np.argsort(-total[pool], kind="stable")]
+    pool = np.arange(0, len(cells), max(1, len(cells) // (POOL * size)))
+    pool = pool[np.argsort(-before[pool], kind="stable")]
     ranks = np.unique(np.geomspace(1, len(pool), size).astype(np.int64)) - 1
     sample = pool[ranks]
-    new, before, window = rank(sample), loglik[sample], size // WINDOWS
+    new, old, window = rank(cells[sample]), before[sample], size // WINDOWS
     moves, levels = [], []
     for low in range(0, len(sample), window):
         part = slice(low, low + window)
-        moves.append(np.logaddexp.reduce(new[part]) - np.logaddexp.reduce(before[part]))
-        levels.append(total[sample[part]].mean())
-    move = np.full(len(loglik), moves[-1])  # the others are worse than any level
-    move[tail] = np.interp(total[tail], levels[::-1], moves[::-1])
-    loglik += move
+        moves.append(log_sum(new[part]) - log_sum(old[part]))
+        levels.append(old[part].mean())
+    return np.interp(before, levels[::-1], moves[::-1])
 
 
 def _score_cells(
@@ -480,17 +491,18 @@ def _score_cells(
     view: View,
     cells: NDArray[np.int64],
     *,
+    models: _Models,
+    points: NDArray[np.float64],
     scores: CellScores,
     north_sigma: float,
-    off_centre: bool,
+    least: float = -math.inf,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     """Return the log-likelihood of some cells, and the likeliest turns of the photos in each."""
     from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba, 0.25 s
 
-    models, points = index.observer_offsets if off_centre else (index.models, np.zeros((1, 2)))
     views = (
         visible_objects_off_centre(index.database, cells, points)
-        if off_centre
+        if len(points) > 1
         else visible_objects_in(index.database, cells)
     )
     total, likeliest = np.zeros((len(cells), len(points))), []
@@ -510,6 +522,7 @@ def _score_cells(
             log_prior=chances,
             # A place that does not fit one photo may fit the others.
             group=len(points) if len(scores.headings) == 1 else 1,
+            least=least if len(scores.headings) == 1 else -math.inf,
         )
         logliks = logliks.reshape(len(cells), len(points), -1)
         best = np.logaddexp.reduce(logliks, axis=1).argmax(axis=1)

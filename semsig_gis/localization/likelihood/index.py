@@ -234,7 +234,9 @@ class LikelihoodIndex(Displayed):
             loglik = np.empty(len(cells))
 
             def score_part(part: NDArray[np.int64]) -> None:
-                views = visible_objects_off_centre(self.database, cells[slice(*part)], points)
+                views = visible_objects_off_centre(
+                    self.database, cells[slice(*part)], points, neighbours=False
+                )
                 bins = (views.bearings * (BINS / FULL_TURN)).astype(np.uint16) % np.uint16(BINS)
                 units = levels.table.scale.units(views.distances)
                 objects = levels.objects(views.offsets, views.codes, bins, units)
@@ -282,19 +284,10 @@ def photo_scorer(
     """
     from semsig_gis.localization.likelihood.kernels import scan, scan_turned  # noqa: PLC0415 - numba, 0.25 s
 
-    table = levels.table
-    detections = PhotoTable.of(photo, table)
-    density = detections.density(table)
-    rows, masses = levels.rows(detections), levels.masses(detections)
-    naming = detections.named(table)[: len(levels.model.detected)] / density
-    disc = detections.disc / FULL_TURN
-    base = float(np.log(density).sum())
-    if before is None:
-        base -= float(table.clutter.sum() * detections.width)
-    width = detections.width
-
+    arrays = photo_rows(photo, levels)
+    if before is not None:  # which has the clutter
+        arrays = arrays._replace(base=arrays.base + float(levels.table.clutter.sum()) * arrays.width)
     if north_sigma == 0.0:
-        arrays = PhotoRows(rows, masses, _padded(naming), _padded(disc), width, base)
 
         def score(objects: BinnedObjects) -> _PhotoScores:
             size = len(objects.offsets) - 1
@@ -308,14 +301,15 @@ def photo_scorer(
         return score
 
     # One row for each detection, in the place of blocks of them.
-    by_detection = np.moveaxis(rows, 4, 1).reshape(-1, *rows.shape[1:4])[: len(density)]
+    size, rows = len(photo), arrays.rows
+    by_detection = np.moveaxis(rows, 4, 1).reshape(-1, *rows.shape[1:4])[:size]
     turned = PhotoRows(
         _turned(by_detection),
-        _turned(masses),
-        naming.astype(np.float32),
-        disc.astype(np.float32),
-        width,
-        base,
+        _turned(arrays.masses),
+        np.ascontiguousarray(arrays.naming[..., :size]),
+        arrays.disc[:size],
+        arrays.width,
+        arrays.base,
     )
     prior = TurnPrior.of(north_sigma)
     nothing = TurnScores(np.empty(0, np.float32), np.empty((0, len(prior.chances)), np.float32))
@@ -333,6 +327,21 @@ def photo_scorer(
         return scores, best * np.float32(FULL_TURN / TURNS)
 
     return score_turned
+
+
+def photo_rows(photo: View, levels: NoiseLevels) -> PhotoRows:
+    """Return a photo as the kernels take it, with detections in whole blocks of `LANES`."""
+    table = levels.table
+    detections = PhotoTable.of(photo, table)
+    density = detections.density(table)
+    return PhotoRows(
+        levels.rows(detections),
+        levels.masses(detections),
+        _padded(detections.named(table)[: len(levels.model.detected)] / density),
+        _padded(detections.disc / FULL_TURN),
+        detections.width,
+        float(np.log(density).sum() - table.clutter.sum() * detections.width),
+    )
 
 
 def photo_power(photos: int, noise: Noise) -> float:

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import BEARING_UNITS, FULL_TURN, cell_ids, compiled, share_rows
+from semsig_gis.core import (
+    BEARING_UNITS,
+    FULL_TURN,
+    cell_ids,
+    compiled,
+    share_rows,
+    signed_degrees,
+)
 from semsig_gis.database import VisibleObjects
 
 if TYPE_CHECKING:
@@ -19,7 +26,9 @@ CELLS_A_THREAD = 64  # the fewest cells that are worth a thread
 # The cell itself and its neighbours, as steps east and north: number 3 * (east + 1) + (north + 1).
 AROUND = tuple((east, north) for east in (-1, 0, 1) for north in (-1, 0, 1))
 OWN = AROUND.index((0, 0))
+SECTORS = 60  # of bearings, by which objects of neighbours are left out quickly
 FIRST_ROOM = 4096  # objects
+_UNITS_A_SECTOR = np.uint16(BEARING_UNITS // SECTORS)
 TINY = 1e-300  # avoids a division by 0: an object at exactly the point counts as north of it
 
 
@@ -28,8 +37,9 @@ class _CellObjects(NamedTuple):
 
     `ranges` is by class code, `metres` by distance unit, `east` and `north` of a metre by bearing
     unit. `own`, by class code, is whether only the cell itself has objects of the class: points of
-    an extended thing differ from cell to cell, and far landmarks are rounded to many metres. `step`
-    is the side of a cell in metres.
+    an extended thing differ from cell to cell, and far landmarks are rounded to many metres.
+    `nearest`, by cell around and sector, is the least distance unit at which an object of that cell
+    may be out of range of the cell itself. `step` is the side of a cell in metres.
     """
 
     offsets: NDArray[np.int64]
@@ -41,24 +51,31 @@ class _CellObjects(NamedTuple):
     metres: NDArray[np.float64]
     east: NDArray[np.float64]
     north: NDArray[np.float64]
+    nearest: NDArray[np.int64]
     step: float
 
 
 def visible_objects_off_centre(
-    database: SignatureDatabase, cells: NDArray[np.int64], points: NDArray[np.float64]
+    database: SignatureDatabase,
+    cells: NDArray[np.int64],
+    points: NDArray[np.float64],
+    *,
+    neighbours: bool = True,
 ) -> VisibleObjects:
     """Return the views from points off the centres of some cells, computed only from the cells.
 
     The points, shape (p, 2), are metres to the east and north of the centre, less than a cell; that
     of cell i and point j is view ``i * len(points) + j``. Objects that come into range there are
-    taken from the neighbouring cells on that side. If one of these cells is missing, objects that
-    are out of range there are kept, at their distance, as are extended things and landmarks, which
-    are taken only from the cell itself.
+    taken from the neighbouring cells on that side. If one of these cells is missing, or
+    `neighbours` are not wanted, objects that are out of range there are kept, at their distance, as
+    are extended things and landmarks, which are taken only from the cell itself.
     """
     # The row of each neighbour, -1 where there is none; the cells of a column follow each other.
     columns, rows = database.columns[cells].astype(np.int64), database.rows[cells].astype(np.int64)
     ids, around = database.cell_ids, np.full((len(cells), len(AROUND)), -1)
-    for east in np.unique(np.append(np.sign(points[:, 0]), 0)).astype(np.int64).tolist():
+    around[:, OWN] = cells
+    sides = np.unique(np.append(np.sign(points[:, 0]), 0)).astype(np.int64) if neighbours else []
+    for east in map(int, sides):
         number = np.searchsorted(ids, cell_ids(columns + east, rows - 1))
         for north in (-1, 0, 1):
             there = ids[np.minimum(number, len(ids) - 1)] == cell_ids(columns + east, rows + north)
@@ -69,18 +86,21 @@ def visible_objects_off_centre(
         True
     )
     angles = np.radians((np.arange(BEARING_UNITS) + 0.5) * (FULL_TURN / BEARING_UNITS))
+    ranges = database.taxonomy.ranges(database.spec.radius)
+    # The nearest objects are not at exactly the point.
+    metres, step = database.scale.positive_metres, float(database.grid.step)
     objects = _CellObjects(
         offsets=database.offsets,
         codes=database.codes,
         bearing_units=database.bearing_units,
         distance_units=database.distance_units,
-        ranges=database.taxonomy.ranges(database.spec.radius),
+        ranges=ranges,
         own=own,
-        # The nearest objects are not at exactly the point.
-        metres=database.scale.positive_metres,
+        metres=metres,
         east=np.sin(angles),
         north=np.cos(angles),
-        step=float(database.grid.step),
+        nearest=_nearest_units(metres, step, radius=float(ranges[~own[: len(ranges)]].min())),
+        step=step,
     )
     points = np.ascontiguousarray(points, dtype=np.float64)
     parts = {}
@@ -101,6 +121,24 @@ def visible_objects_off_centre(
         distances=distances,
         extents=None if database.extents is None else database.extents[entries],
     )
+
+
+def _nearest_units(
+    metres: NDArray[np.float64], step: float, *, radius: float
+) -> NDArray[np.int64]:
+    """Return `_CellObjects.nearest` for objects with a range of at least `radius` metres."""
+    away = step * np.hypot(*np.transpose(AROUND))
+    direction = np.degrees(np.arctan2(*np.transpose(AROUND)))
+    middles = (np.arange(SECTORS) + 0.5) * (FULL_TURN / SECTORS)
+    # The smallest angle of the sector with the direction of the cell.
+    angle = np.abs(signed_degrees(middles - direction[:, None])) - 0.5 * FULL_TURN / SECTORS
+    along = away[:, None] * np.cos(np.radians(np.maximum(angle, 0.0)))
+    # An object is farther than the radius from the cell itself beyond this distance, or anywhere.
+    square = along**2 + radius**2 - away[:, None] ** 2
+    beyond = np.where(square > 0.0, np.sqrt(np.maximum(square, 0.0)) - along, 0.0)
+    nearest = np.maximum(np.searchsorted(metres, beyond) - 1, 0)  # rounded down
+    nearest[OWN] = 0  # its own objects are all in range
+    return nearest
 
 
 @compiled
@@ -165,6 +203,7 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
     offsets, codes, step = objects.offsets, objects.codes, objects.step
     bearing_units, distance_units = objects.bearing_units, objects.distance_units
     ranges, metres, east, north = objects.ranges, objects.metres, objects.east, objects.north
+    nearest = objects.nearest
     # Working memory for the cell with the most objects around, without functions of numpy, which
     # load slowly.
     most = 0
@@ -192,7 +231,10 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
                 continue
             right, above = (source // 3 - 1) * step, (source % 3 - 1) * step
             for entry in range(offsets[row], offsets[row + 1]):
-                metre, angle = metres[distance_units[entry]], bearing_units[entry]
+                angle = bearing_units[entry]
+                if distance_units[entry] < nearest[source, angle // _UNITS_A_SECTOR]:
+                    continue
+                metre = metres[distance_units[entry]]
                 x[size], y[size] = metre * east[angle] + right, metre * north[angle] + above
                 numbers[size], stays[size] = entry, objects.own[codes[entry]]
                 reach[size] = ranges[codes[entry]] ** 2

@@ -164,13 +164,15 @@ def photo_loglik(
     log_prior: NDArray[np.float64] | None = None,
     group: int = 1,
     whole: bool = False,
+    least: float = -math.inf,
 ) -> NDArray[np.float64]:
     """Return the log-likelihood of a photo by place and turn, shape (v, r).
 
     `weights` are the chances of the tables, `turns` the degrees to turn the photo by at each place.
     If only sums over each `group` of successive places are needed, with a `log_prior` of places and
     turns, or only the sum over the `whole`, in which likely places come first, then terms that are
-    negligible in the sum (`LOST_SHARE`) are not computed: they get an upper bound.
+    negligible in the sum (`LOST_SHARE`) are not computed: they get an upper bound. So do terms that
+    are surely below `least` with their prior.
     """
     from semsig_gis.localization.likelihood.association_kernels import sum_associations  # noqa: PLC0415 - numba, 0.25 s
 
@@ -196,11 +198,12 @@ def photo_loglik(
     def fill(part: NDArray[np.int64], reached: float) -> None:
         sum_associations(part, group, reached, margin, objects, arrays, models, grid, logliks)
 
-    groups, least = -(-len(turns) // group), max(PLACES_A_THREAD // group, 1)
-    ahead, reached = 0, -math.inf
+    groups, a_thread = -(-len(turns) // group), max(PLACES_A_THREAD // group, 1)
+    ahead, reached = 0, least + margin
     if whole:
         ahead = min(FIRST_PLACES, groups)
-        share_rows(lambda part: fill(part, -math.inf), ahead, least=least)
+        first = reached
+        share_rows(lambda part: fill(part, first), ahead, least=a_thread)
         reached = float((logliks[:, :ahead] + prior[:ahead]).max(initial=reached))
-    share_rows(lambda part: fill(part + ahead, reached), groups - ahead, least=least)
+    share_rows(lambda part: fill(part + ahead, reached), groups - ahead, least=a_thread)
     return np.asarray(np.logaddexp.reduce(logliks, axis=0))

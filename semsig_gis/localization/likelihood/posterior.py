@@ -14,11 +14,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import Displayed, InputError, cell_ids, percent, signed_degrees
+from semsig_gis.core import (
+    Displayed,
+    InputError,
+    cell_ids,
+    log_sum,
+    percent,
+    signed_degrees,
+)
 from semsig_gis.database import TOLERANCE_M, visible_objects_at
-from semsig_gis.localization.likelihood.association import turn_logs
 from semsig_gis.localization.likelihood.index import own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
+from semsig_gis.localization.likelihood.turns import turn_logs
 from semsig_gis.localization.noise.model import cell_noise
 from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables
 from semsig_gis.observation import View, check_north
@@ -39,6 +46,7 @@ NO_CHANCE = 1e-16  # smaller ones add less than 1e-9 bits to the entropy of a la
 LIKELIEST_CELLS = 1000
 """Cells among which the best place is searched."""
 LEAST_POWER = -1100  # of two; smaller numbers are 0
+IMPOSSIBLE = 60.0  # nats below the likeliest cell at which the chance is 0
 
 
 class Places(NamedTuple):
@@ -86,22 +94,30 @@ class Posterior(Displayed):
         }
 
     @cached_property
+    def _possible(self) -> NDArray[np.int64]:
+        """Row numbers of the cells of chance above 0."""
+        return np.flatnonzero(self.chances)
+
+    @cached_property
     def _powers(self) -> NDArray[np.int64]:
-        """Binary exponent of the chance of each cell, minus `LEAST_POWER`; 0 if the chance is 0."""
-        return np.where(self.chances > 0, np.frexp(self.chances)[1] - LEAST_POWER, 0)
+        """Binary exponent of the chance of each possible cell, minus `LEAST_POWER`."""
+        return np.frexp(self.chances[self._possible])[1].astype(np.int64) - LEAST_POWER
 
-    def _top(self, amount: float, chances: NDArray[np.float64] | None = None) -> NDArray[np.int64]:
-        """Return cells that include the likeliest ones up to an amount, in any order.
+    def _top(self, amount: float, *, share: bool = False) -> NDArray[np.int64]:
+        """Return possible cells that include the likeliest ones up to an amount, in any order.
 
-        The amount is a number of cells or, with the chances, a share. Sorting all takes longer.
+        The amount is a number of cells or a `share` of the chance. Sorting all takes longer.
         """
-        amounts = np.cumsum(np.bincount(self._powers, chances)[::-1])
+        weights = self.chances[self._possible] if share else None
+        amounts = np.cumsum(np.bincount(self._powers, weights)[::-1])
         power = len(amounts) - 1 - int(np.searchsorted(amounts, amount))
-        return np.flatnonzero(self._powers >= power)
+        return self._possible[self._powers >= power]
 
     def likeliest(self, count: int) -> NDArray[np.int64]:
         """Return the row numbers of the `count` likeliest cells, likeliest first."""
         cells = self._top(count)
+        if len(cells) < min(count, len(self.chances)):
+            cells = np.arange(len(self.chances))  # impossible cells are the least likely
         if len(cells) > 2 * count:
             some = self.chances[cells]
             # Partition the negatives: many equal zeros at the start take ten times as long.
@@ -128,8 +144,7 @@ class Posterior(Displayed):
             )
         # A sum of 0.9 - 1e-17 must not add another cell.
         share *= 1.0 - 1e-12
-        cells = self._top(share, self.chances)
-        cells = _likeliest_first(self.chances, cells[self.chances[cells] > 0])
+        cells = _likeliest_first(self.chances, self._top(share, share=True))
         return cells[: int(np.searchsorted(np.cumsum(self.chances[cells]), share)) + 1]
 
     def mass_within(
@@ -147,8 +162,8 @@ class Posterior(Displayed):
         columns = database.columns[centres].astype(np.int64)
         rows = database.rows[centres].astype(np.int64)
         # The cells are ordered by column and row: in each column, the circle is one slice.
-        ids = database.cell_ids
-        before = np.concatenate([[0.0], np.cumsum(self.chances)])
+        ids = database.cell_ids[self._possible]
+        before = np.concatenate([[0.0], np.cumsum(self.chances[self._possible])])
         total = np.zeros(len(columns))
         for east, north in zip(*(part.tolist() for part in self._circle(radius)[1:]), strict=True):
             low = np.searchsorted(ids, cell_ids(columns + east, rows - north), side="left")
@@ -305,8 +320,10 @@ def posterior(
         raise InputError("a likelihood or a prior is not a number or is infinite; give logarithms.")
     if top == -np.inf:
         raise InputError("the prior excludes every cell that the query may be in; widen it.")
-    chances = np.exp(total - top)
-    prior = math.log(total.size) if log_prior is None else np.logaddexp.reduce(log_prior)
+    likely = np.flatnonzero(total > top - IMPOSSIBLE)
+    chances = np.zeros(total.size)
+    chances[likely] = np.exp(total[likely] - top)
+    prior = math.log(total.size) if log_prior is None else log_sum(log_prior)
     return Posterior(
         database=database,
         chances=chances / chances.sum(),
@@ -321,9 +338,9 @@ def prior_ratio(loglik: NDArray[np.floating], log_prior: NDArray[np.float64]) ->
     likelihoods l, it is ``sum(p * l) / mean(l)``. If the prior is right, it is below r for at most
     a share r of the queries, because its inverse has a mean of 1 (Markov's inequality).
     """
-    both = np.logaddexp.reduce(loglik + log_prior) - np.logaddexp.reduce(log_prior)
-    uniform = np.logaddexp.reduce(loglik.astype(np.float64)) - math.log(len(loglik))
-    return math.exp(max(float(both - uniform), LEAST_LOG))
+    both = log_sum(loglik + log_prior) - log_sum(log_prior)
+    uniform = log_sum(loglik.astype(np.float64)) - math.log(len(loglik))
+    return math.exp(max(both - uniform, LEAST_LOG))
 
 
 DIVIDED_PARTS = (1000, 400, 200, 100)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import FULL_TURN
+from semsig_gis.core import FULL_TURN, signed_degrees
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,3 +49,11 @@ class TurnScores(NamedTuple):
         """Return room for the likelihood of a photo by turn."""
         turns = len(TurnPrior.of(north_sigma).chances)
         return cls(np.empty(cells, np.float32), np.empty((cells, turns), np.float32))
+
+
+def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
+    """Return the log of the chance of each turn, which is one `step` wide; all are in degrees."""
+    if math.isinf(north_sigma):
+        return np.full(turns.shape, math.log(step / 360.0))
+    scale = math.log(step / (north_sigma * math.sqrt(2.0 * math.pi)))
+    return np.asarray(scale - 0.5 * (signed_degrees(turns) / north_sigma) ** 2)
