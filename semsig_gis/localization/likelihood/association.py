@@ -22,7 +22,12 @@ import numpy as np
 
 from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, log_sum, signed_degrees
 from semsig_gis.database import visible_objects_in
-from semsig_gis.localization.likelihood.index import CellScores, own_sigma, photo_power
+from semsig_gis.localization.likelihood.index import (
+    FIRST_DETECTIONS,
+    CellScores,
+    own_sigma,
+    photo_power,
+)
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.localization.likelihood.turns import turn_logs
 from semsig_gis.localization.noise.table import database_tables, extent_sigma
@@ -302,7 +307,7 @@ RERANKED = 500
 """Default number of cells that are re-ranked."""
 CHOSEN_FROM = 8192  # cells of which those to re-rank are chosen
 # Cells in the first batch of each; then as many again, twice as many, ...
-FIRST_CHOSEN, FIRST_RERANKED = 256, 32
+FIRST_CHOSEN, FIRST_RERANKED = 512, 32
 # Points in the other cells at which a sample of these is scored: usually, and for a quick answer.
 SAMPLE, QUICK_SAMPLE = 4608, 768
 # Batches end when the last one holds less than this share of the chance. Other cells that together
@@ -383,7 +388,8 @@ def rerank(
         prior,
         count=CHOSEN_FROM,
         first=FIRST_CHOSEN,
-        bounds=True,
+        # The first scores of few detections are upper bounds.
+        bounds=max(map(len, view.split()), default=0) <= FIRST_DETECTIONS,
     )
     chosen, before, move = nearer.cells, nearer.after, nearer.move
     ranked = _rank_best(exact, chosen, before, prior, count=count, first=FIRST_RERANKED)

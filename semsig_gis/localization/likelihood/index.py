@@ -57,6 +57,9 @@ EXTENT_RATIO = 3.0  # of errors of extended things that do
 DISTANCE_LEVELS = 64
 """Distances at which errors are computed."""
 
+FIRST_DETECTIONS = 8
+"""Detections of a photo by which cells are chosen."""
+
 VERSION = 6  # increased whenever the same database and noise give other likelihoods
 POINTS_A_SIDE = 3  # of the grid of points in a cell at which the best cells are compared
 LEAST_DENSITY = 1e-12  # densities below count as 0: products of them would be slow to compute
@@ -192,6 +195,22 @@ class LikelihoodIndex(Displayed):
 
         return self.scores_by_photo(query, north_sigma, score_photo)
 
+    def first_scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
+        """Return scores by which cells are chosen, from `FIRST_DETECTIONS` of each photo at most.
+
+        The detections are evenly spaced. In cells with many objects, sums over more detections
+        would count too often that an object explains several of them.
+        """
+
+        def score_photo(photo: View, sigma: float) -> _PhotoScores:
+            some = np.unique(np.linspace(0, len(photo) - 1, FIRST_DETECTIONS).round().astype(int))
+            if len(photo) > FIRST_DETECTIONS:
+                share = FIRST_DETECTIONS / len(photo)
+                return photo_scorer(photo.select(some), self.levels, sigma, share=share)(self.objects)
+            return photo_scorer(photo, self.levels, sigma)(self.objects)
+
+        return self.scores_by_photo(query, north_sigma, score_photo)
+
     def scores_by_photo(
         self,
         query: Signature,
@@ -275,16 +294,19 @@ def photo_scorer(
     levels: NoiseLevels,
     north_sigma: float,
     *,
+    share: float = 1.0,
     before: TurnScores | None = None,
     after: TurnScores | None = None,
 ) -> _Scorer:
     """Return a function of objects by place: the log-likelihood of a photo and its likeliest turns.
 
-    For a photo of uncertain north, the scores go on from those `before`, and fill `after`.
+    The photo has a `share` of all detections, taken without regard to what they are. For a photo of
+    uncertain north, the scores go on from those `before`, and fill `after`.
     """
     from semsig_gis.localization.likelihood.kernels import scan, scan_turned  # noqa: PLC0415 - numba, 0.25 s
 
-    arrays = photo_rows(photo, levels)
+    arrays, model = photo_rows(photo, levels, share=share), levels.model
+    model = model._replace(detected=model.detected * np.float32(share))
     if before is not None:  # which has the clutter
         arrays = arrays._replace(base=arrays.base + float(levels.table.clutter.sum()) * arrays.width)
     if north_sigma == 0.0:
@@ -293,7 +315,7 @@ def photo_scorer(
             size = len(objects.offsets) - 1
             totals, products = np.empty(size), np.empty(size)
             share_rows(
-                lambda part: scan(part, objects, levels.model, arrays, totals, products), size
+                lambda part: scan(part, objects, model, arrays, totals, products), size
             )
             totals += np.log(products)
             return totals.astype(np.float32), None
@@ -320,7 +342,7 @@ def photo_scorer(
         old, new = before or nothing, after or nothing
         share_rows(
             lambda part: scan_turned(
-                part, objects, levels.model, turned, prior, old, new, scores, best
+                part, objects, model, turned, prior, old, new, scores, best
             ),
             size,
         )
@@ -329,18 +351,21 @@ def photo_scorer(
     return score_turned
 
 
-def photo_rows(photo: View, levels: NoiseLevels) -> PhotoRows:
-    """Return a photo as the kernels take it, with detections in whole blocks of `LANES`."""
+def photo_rows(photo: View, levels: NoiseLevels, *, share: float = 1.0) -> PhotoRows:
+    """Return a photo as the kernels take it, with detections in whole blocks of `LANES`.
+
+    The photo has a `share` of all detections.
+    """
     table = levels.table
     detections = PhotoTable.of(photo, table)
-    density = detections.density(table)
+    density = share * detections.density(table)
     return PhotoRows(
         levels.rows(detections),
         levels.masses(detections),
         _padded(detections.named(table)[: len(levels.model.detected)] / density),
         _padded(detections.disc / FULL_TURN),
         detections.width,
-        float(np.log(density).sum() - table.clutter.sum() * detections.width),
+        float(np.log(density).sum() - share * table.clutter.sum() * detections.width),
     )
 
 

@@ -599,7 +599,7 @@ class LikelihoodLocator:
         index = reading.index
         if self.incremental is not None and index is self.index:
             return self.incremental.scores(reading.view, north_sigma=self.north_sigma)
-        return index.scores(reading.view, north_sigma=self.north_sigma)
+        return index.first_scores(reading.view, north_sigma=self.north_sigma)
 
     def scores(
         self,
