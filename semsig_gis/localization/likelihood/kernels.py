@@ -422,6 +422,45 @@ def promising_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.int64
 
 
 @compiled
+def _position(ids: NDArray[np.int64], value: int) -> int:
+    """Return the number of ids below a value; they are ascending."""
+    low, size = 0, len(ids)
+    while size > 0:
+        half = size // 2
+        if ids[low + half] < value:
+            low += half + 1
+            size -= half + 1
+        else:
+            size = half
+    return low
+
+
+@compiled
+def sum_circles(  # noqa: PLR0917 - a kernel takes no keywords
+    centres: NDArray[np.int64],
+    ids: NDArray[np.int64],
+    before: NDArray[np.float64],
+    columns: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    sums: NDArray[np.float64],
+) -> None:
+    """Fill `sums` with the chance in a circle around each of some cells.
+
+    `centres` are ids of cells. `ids` are those of all cells with a chance, ascending, and `before`
+    the sum of the chances before each of them and of all. The circle has the ids of a centre plus
+    `columns`, and up to `rows` more or less in each column.
+    """
+    for place in range(len(centres)):
+        total = 0.0
+        for number in range(len(columns)):
+            middle = centres[place] + columns[number]
+            low = _position(ids, middle - rows[number])
+            high = low + _position(ids[low:], middle + rows[number] + 1)
+            total += before[high] - before[low]
+        sums[place] = total
+
+
+@compiled
 def count_types(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
     offsets: NDArray[np.int64],
     codes: NDArray[np.uint8],

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from semsig_gis.core import (
+    ROW_SPAN,
     Displayed,
     InputError,
     cell_ids,
@@ -45,7 +46,7 @@ ROUNDING = 1e-3  # of a sum of chances in a file of float32
 NO_CHANCE = 1e-16  # smaller ones add less than 1e-9 bits to the entropy of a large city
 LIKELIEST_CELLS = 1000
 """Cells among which the best place is searched."""
-LEAST_POWER = -1100  # of two; smaller numbers are 0
+MANTISSA_BITS = 52  # of a float64; its exponent is above them
 IMPOSSIBLE = 60.0  # nats below the likeliest cell at which the chance is 0
 
 
@@ -100,8 +101,8 @@ class Posterior(Displayed):
 
     @cached_property
     def _powers(self) -> NDArray[np.int64]:
-        """Binary exponent of the chance of each possible cell, minus `LEAST_POWER`."""
-        return np.frexp(self.chances[self._possible])[1].astype(np.int64) - LEAST_POWER
+        """Binary exponent of the chance of each possible cell, above 0."""
+        return self.chances[self._possible].view(np.int64) >> MANTISSA_BITS
 
     def _top(self, amount: float, *, share: bool = False) -> NDArray[np.int64]:
         """Return possible cells that include the likeliest ones up to an amount, in any order.
@@ -115,6 +116,8 @@ class Posterior(Displayed):
 
     def likeliest(self, count: int) -> NDArray[np.int64]:
         """Return the row numbers of the `count` likeliest cells, likeliest first."""
+        if count == 1:
+            return np.array([self.chances.argmax()])
         cells = self._top(count)
         if len(cells) < min(count, len(self.chances)):
             cells = np.arange(len(self.chances))  # impossible cells are the least likely
@@ -157,6 +160,8 @@ class Posterior(Displayed):
         """
         if not (math.isfinite(radius) and radius >= 0):
             raise InputError(f"a radius of {radius} m was given; give metres, 0 or more.")
+        from semsig_gis.localization.likelihood.kernels import sum_circles  # noqa: PLC0415 - numba, 0.25 s
+
         database = self.database
         centres = slice(None) if cells is None else cells
         columns = database.columns[centres].astype(np.int64)
@@ -164,11 +169,9 @@ class Posterior(Displayed):
         # The cells are ordered by column and row: in each column, the circle is one slice.
         ids = database.cell_ids[self._possible]
         before = np.concatenate([[0.0], np.cumsum(self.chances[self._possible])])
-        total = np.zeros(len(columns))
-        for east, north in zip(*(part.tolist() for part in self._circle(radius)[1:]), strict=True):
-            low = np.searchsorted(ids, cell_ids(columns + east, rows - north), side="left")
-            high = np.searchsorted(ids, cell_ids(columns + east, rows + north), side="right")
-            total += before[high] - before[low]
+        total = np.empty(len(columns))
+        _, east, north = self._circle(radius)
+        sum_circles(cell_ids(columns, rows), ids, before, ROW_SPAN * east, north, total)
         return np.clip(total, 0.0, 1.0)
 
     def best_place(self, radius: float = 50.0) -> tuple[int, float]:
