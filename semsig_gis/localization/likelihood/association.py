@@ -317,8 +317,10 @@ MARGIN = 20.0  # nats below the best cell at which an upper bound of a score is 
 NEGLIGIBLE = 30.0  # nats below the best re-ranked cell at which all cells together are negligible
 POOL = 16  # the sample is drawn from this multiple of its size
 WINDOWS = 8  # ranges of the likelihood, each with a shift of its own
-# Degrees around the likeliest turn of the scan, which is exact to less than six degrees.
-NEAR_TURNS = np.arange(-7.5, 7.6, 3.0)
+# Degrees around the likeliest turn of the scan, which is exact to less than six degrees; those near
+# it come first, and bound the others.
+TURN_STEP = 3.0
+NEAR_TURNS = np.array([-1.5, 1.5, -4.5, 4.5, -7.5, 7.5])
 
 
 def score_associations(
@@ -518,7 +520,7 @@ def _score_cells(
         point_turns = np.repeat(turns, len(points), axis=0)
         chances = np.zeros(point_turns.shape)
         if heading is not None:
-            step, sigma = NEAR_TURNS[1] - NEAR_TURNS[0], own_sigma(photo, north_sigma)
+            step, sigma = TURN_STEP, own_sigma(photo, north_sigma)
             chances = turn_logs(point_turns, step, sigma)
         logliks = chances + photo_loglik(
             table,

@@ -20,12 +20,19 @@ import numpy as np
 from semsig_gis.core import (
     BEARING_UNITS,
     FULL_TURN,
+    WILDCARD,
     Displayed,
     crs_label,
     share_rows,
 )
 from semsig_gis.localization.likelihood.photo import PhotoTable
-from semsig_gis.localization.likelihood.records import LANES, BinnedObjects, LevelModel, PhotoRows
+from semsig_gis.localization.likelihood.records import (
+    LANES,
+    BinnedObjects,
+    LevelModel,
+    PhotoRows,
+    TurnedPhoto,
+)
 from semsig_gis.localization.likelihood.turns import TURNS, TurnPrior, TurnScores
 from semsig_gis.localization.noise.beyond import noise_with_objects_beyond
 from semsig_gis.localization.noise.model import ROUNDING, cell_noise, place_noise
@@ -57,8 +64,8 @@ EXTENT_RATIO = 3.0  # of errors of extended things that do
 DISTANCE_LEVELS = 64
 """Distances at which errors are computed."""
 
-FIRST_DETECTIONS = 8
-"""Detections of a photo by which cells are chosen."""
+FIRST_DETECTIONS, FIRST_TURNED_DETECTIONS = 8, 16
+"""Detections of a photo by which cells are chosen, if its north is known and if not."""
 
 VERSION = 6  # increased whenever the same database and noise give other likelihoods
 POINTS_A_SIDE = 3  # of the grid of points in a cell at which the best cells are compared
@@ -203,11 +210,12 @@ class LikelihoodIndex(Displayed):
         """
 
         def score_photo(photo: View, sigma: float) -> _PhotoScores:
-            some = np.unique(np.linspace(0, len(photo) - 1, FIRST_DETECTIONS).round().astype(int))
-            if len(photo) > FIRST_DETECTIONS:
-                share = FIRST_DETECTIONS / len(photo)
-                return photo_scorer(photo.select(some), self.levels, sigma, share=share)(self.objects)
-            return photo_scorer(photo, self.levels, sigma)(self.objects)
+            most = FIRST_DETECTIONS if sigma == 0.0 else FIRST_TURNED_DETECTIONS
+            share = min(most / max(len(photo), 1), 1.0)
+            if share < 1.0:
+                photo = photo.select(np.linspace(0, len(photo) - 1, most).round().astype(np.int64))
+            scorer = photo_scorer if sigma == 0.0 or not _is_plain(photo) else profile_scorer
+            return scorer(photo, self.levels, sigma, share=share)(self.objects)
 
         return self.scores_by_photo(query, north_sigma, score_photo)
 
@@ -349,6 +357,58 @@ def photo_scorer(
         return scores, best * np.float32(FULL_TURN / TURNS)
 
     return score_turned
+
+
+def _is_plain(photo: View) -> bool:
+    """Whether a photo is a full turn of objects of classes, without ranges and errors of its own."""
+    unknown = photo.codes is None or photo.scores is not None or (photo.codes == WILDCARD).any()
+    rough = photo.bearing_errors is not None and np.nan_to_num(photo.bearing_errors).any()
+    ranged = photo.ranges is not None and not np.isnan(photo.ranges).all()
+    return not (unknown or rough or ranged or photo.photos[0].sectors)
+
+
+def profile_scorer(
+    photo: View, levels: NoiseLevels, north_sigma: float, *, share: float = 1.0
+) -> _Scorer:
+    """Return about `photo_scorer` for a plain photo of uncertain north.
+
+    Bearings are rounded to the turns, and wrong names all have the chance of the likeliest.
+    """
+    from semsig_gis.localization.likelihood.kernels import scan_profiles  # noqa: PLC0415 - numba, 0.25 s
+
+    table, model = levels.table, levels.model
+    detections, same = PhotoTable.of(photo, table), np.eye(len(table.codes), dtype=np.bool_)
+    density = share * table.clutter / FULL_TURN
+    wrong = table.misnamed[: len(model.detected), :, None]
+    names = ((1.0 - wrong) * same + wrong * table.others) / density
+    other = np.where(same, 0.0, names).max(axis=2)
+    rows = table.class_rows(np.asarray(photo.codes))
+    classes, profiles = np.unique(rows, return_inverse=True)
+    profile_of = np.zeros(len(table.codes), np.int64)
+    profile_of[classes] = np.arange(1, len(classes) + 1)
+    # An object at each step inside a turn, and the middles of the turns before and after it.
+    steps = BINS // TURNS
+    away = (np.arange(-TURNS, TURNS) + 0.5) * steps - (np.arange(steps)[:, None] + 0.5)
+    turned = TurnedPhoto(
+        rows=levels.fine[:, :, np.rint(away * (FINE / BINS)).astype(np.int64) % FINE],
+        own=(np.einsum("lkk->lk", names) - other).astype(np.float32),
+        other=other.astype(np.float32),
+        profile_of=profile_of,
+        profiles=profiles.reshape(-1) + 1,
+        sectors=(detections.bearings * (TURNS / FULL_TURN)).astype(np.int64) % TURNS,
+        chances=TurnPrior.of(north_sigma).by_turn(),
+        base=float(np.log(density[rows]).sum() - density.sum() * FULL_TURN),
+    )
+    model = model._replace(detected=model.detected * np.float32(share))
+
+    def score(objects: BinnedObjects) -> _PhotoScores:
+        size = len(objects.offsets) - 1
+        scores, best = np.empty(size, np.float32), np.empty(size, np.int64)
+        share_rows(lambda part: scan_profiles(part, objects, model, turned, scores, best), size)
+        turns = (best + TURNS // 2) % TURNS - TURNS // 2
+        return scores, (turns * (FULL_TURN / TURNS)).astype(np.float32)
+
+    return score
 
 
 def photo_rows(photo: View, levels: NoiseLevels, *, share: float = 1.0) -> PhotoRows:

@@ -7,14 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core import compiled
+from semsig_gis.core import FULL_TURN, compiled, compiled_sums
 from semsig_gis.localization.likelihood.records import LANES
 from semsig_gis.localization.likelihood.turns import TURN_BLOCK
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.localization.likelihood.records import BinnedObjects, LevelModel, PhotoRows
+    from semsig_gis.localization.likelihood.records import (
+        BinnedObjects,
+        LevelModel,
+        PhotoRows,
+        TurnedPhoto,
+    )
     from semsig_gis.localization.likelihood.turns import TurnPrior, TurnScores
 
 _LARGE = 1e200  # products beyond this, or below its inverse, become logarithms
@@ -387,6 +392,98 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no ke
             way += 1
         best[place] = first + way
         scores[place] = total + math.log(scale * unit * mass)
+
+
+@compiled_sums
+def scan_profiles(  # noqa: PLR0914, PLR0915, PLR0917 - a kernel is one function
+    part: NDArray[np.int64],
+    objects: BinnedObjects,
+    model: LevelModel,
+    photo: TurnedPhoto,
+    scores: NDArray[np.float32],
+    best: NDArray[np.int64],
+) -> None:
+    """Fill `scores` as `scan`, summed over turns of the photo, and `best` with the likeliest turn.
+
+    First the objects of a place make profiles by bearing: one for each class of the photo, and one
+    for detections of other names. Then each detection reads them at all turns.
+    """
+    offsets, kinds, object_bins = objects.offsets, objects.kinds, objects.bins
+    longest, classes = np.uint64(len(model.detected) - 1), np.uint64(model.detected.shape[1])
+    detected, remaining = model.detected.ravel(), model.remaining.ravel()
+    leaving, group_of = model.leaving.ravel(), model.group_of.astype(np.uint64)
+    own, other, rows = photo.own.ravel(), photo.other.ravel(), photo.rows.ravel()
+    levels, steps = np.uint64(model.remaining.shape[1]), np.uint64(photo.rows.shape[2])
+    profile_of = photo.profile_of
+    step_bits = np.uint64(int(math.log2(photo.rows.shape[2]) + 0.5))
+    level_bits = step_bits + np.uint64(6)
+    turns, twice, one = np.uint64(64), np.uint64(128), np.float32(1.0)
+    bins = turns * steps - np.uint64(1)
+    profiles = np.empty((profile_of.max() + 1) * 128, np.float32)  # two turns each
+    floors = np.empty(profile_of.max() + 1, np.float32)
+    product = np.empty(64, np.float32)
+    for place in range(part[0], part[1]):
+        low, high = np.uint64(offsets[place]), np.uint64(offsets[place + 1])
+        length = min(high - low, longest) * classes
+        profiles[:] = np.float32(0.0)
+        floors[:] = np.float32(0.0)
+        total, unseen, all_leaving = photo.base, 1.0, np.float32(0.0)
+        for entry in range(low, high):
+            kind, bin_ = np.uint64(kinds[entry]), np.uint64(object_bins[entry])
+            level, bin_ = bin_ >> level_bits, bin_ & bins
+            near = detected[length + kind]
+            chance = near * remaining[kind * levels + level]
+            unseen *= one - chance
+            if unseen < 1.0 / _LARGE:
+                total += math.log(unseen)
+                unseen = 1.0
+            odds = chance / (one - chance)
+            # The density at each turn from the bearing of the object on.
+            row = (group_of[kind] * levels + level) * steps + (bin_ & (steps - np.uint64(1)))
+            row = row * twice + turns - (bin_ >> step_bits)
+            weight = odds * other[length + kind]
+            for turn in range(64):
+                profiles[turn] += weight * rows[row + np.uint64(turn)]
+            profile = np.uint64(profile_of[kind])
+            if profile > 0:
+                weight = odds * own[length + kind]
+                for turn in range(64):
+                    profiles[profile * twice + np.uint64(turn)] += weight * rows[row + np.uint64(turn)]
+            # Objects that came into range as others left it, in any direction.
+            away = near * leaving[kind * levels + level]
+            all_leaving += away
+            away /= np.float32(FULL_TURN)
+            floors[0] += away * other[length + kind]
+            if profile > 0:
+                floors[profile] += away * own[length + kind]
+        total += math.log(unseen) - all_leaving
+        for profile in range(len(floors)):
+            for turn in range(64):
+                profiles[profile * 128 + 64 + turn] = profiles[profile * 128 + turn]
+        product[:] = photo.chances
+        for detection in range(len(photo.sectors)):
+            sector = np.uint64(photo.sectors[detection])
+            profile = np.uint64(photo.profiles[detection])
+            floor = one + floors[profile] + floors[0]
+            first = profile * twice + sector
+            for turn in range(64):
+                product[turn] *= (
+                    floor + profiles[first + np.uint64(turn)] + profiles[sector + np.uint64(turn)]
+                )
+            if detection % 4 == 3:  # four sums are below 1e38
+                most = np.float32(0.0)
+                for turn in range(64):
+                    most = max(most, product[turn])
+                total += math.log(most)
+                for turn in range(64):
+                    product[turn] /= most
+        likeliest, mass = 0, np.float32(0.0)
+        for turn in range(64):
+            mass += product[turn]
+            if product[turn] > product[likeliest]:
+                likeliest = turn
+        best[place] = likeliest
+        scores[place] = total + math.log(mass)
 
 
 @compiled

@@ -56,6 +56,26 @@ class PhotoRows(NamedTuple):
     base: float
 
 
+class TurnedPhoto(NamedTuple):
+    """A photo of uncertain north with n detections of classes, for `kernels.scan_profiles`.
+
+    `rows`, shape (groups, levels, steps, 2 * turns), are densities by bearing for objects at each
+    step inside a turn. `own` and `other`, shape (lengths, k), are the chances of the right name and
+    of a likely other one over the density of such false detections. `profile_of` is the profile of
+    a class row, 0 for classes that are not in the photo; `profiles` and `sectors` (n,) are those of
+    the detections. `chances` are those of the turns, `base` the score of a place without objects.
+    """
+
+    rows: NDArray[np.float32]
+    own: NDArray[np.float32]
+    other: NDArray[np.float32]
+    profile_of: NDArray[np.int64]
+    profiles: NDArray[np.int64]
+    sectors: NDArray[np.int64]
+    chances: NDArray[np.float32]
+    base: float
+
+
 class PlaceObjects(NamedTuple):
     """What is seen from n places, for `association_kernels.sum_associations`.
 

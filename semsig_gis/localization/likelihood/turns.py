@@ -38,6 +38,14 @@ class TurnPrior(NamedTuple):
         return cls(int(turns[likely[0]]), np.pad(chances, (0, -len(chances) % TURN_BLOCK)))
 
 
+    def by_turn(self) -> NDArray[np.float32]:
+        """Return the chances of all turns from 0 on."""
+        chances = np.zeros(TURNS, np.float32)
+        turns = (self.first + np.arange(len(self.chances))) % TURNS
+        np.add.at(chances, turns, self.chances)
+        return chances
+
+
 class TurnScores(NamedTuple):
     """The likelihood of a photo in n cells by turn: e to the power of `logs`, times `shares`."""
 
