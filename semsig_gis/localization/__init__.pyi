@@ -60,6 +60,7 @@ from .likelihood.association import associate_pairs as associate_pairs
 from .likelihood.association import near_pairs as near_pairs
 from .likelihood.association import rerank as rerank
 from .likelihood.association import score_associations as score_associations
+from .likelihood.choice import quick_scorer as quick_scorer
 from .likelihood.elsewhere import area_chances as area_chances
 from .likelihood.elsewhere import background_loglik as background_loglik
 from .likelihood.elsewhere import evidence_ratio as evidence_ratio

@@ -14,8 +14,9 @@ import numpy as np
 
 from semsig_gis.core import HALF_TURN
 from semsig_gis.localization.learning.fit import PAIR_DEGREES
-from semsig_gis.localization.likelihood.association import Detections, near_pairs, turn_logs
+from semsig_gis.localization.likelihood.association import Detections, near_pairs
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
+from semsig_gis.localization.likelihood.turns import turn_logs
 from semsig_gis.observation import View
 
 if TYPE_CHECKING:

@@ -360,8 +360,9 @@ def rerank(
     `sample` of the others is scored as well, and each other cell is shifted by as much as the cells
     of the sample with similar scores, so that all chances are comparable. `log_prior` helps to
     choose the cells and is not part of the result. Without bearings, the scores are returned as
-    they are. For queries from anywhere in a cell, points `off_centre` are scored: four in each of
-    some thousand cells by the plain sum, to choose the cells, and then nine in each chosen cell.
+    they are. The cells are chosen by quick one-to-one sums at the centres of some thousand (see
+    `likelihood.choice`). For queries from anywhere in a cell, nine points `off_centre` are scored
+    in each chosen cell.
     """
     from semsig_gis.localization.likelihood.choice import quick_scorer  # noqa: PLC0415 - numba, 0.25 s
     from semsig_gis.localization.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba, 0.25 s
@@ -373,59 +374,62 @@ def rerank(
         return scores
     prior = np.zeros(len(scores.loglik)) if log_prior is None else log_prior
     total = scores.loglik + prior
-    rank = partial(_score_cells, index, view, scores=scores, north_sigma=north_sigma)
-    centre = np.zeros((1, 2))
-    models, points = index.observer_offsets if off_centre else (index.models, centre)
-
-    def exact(cells: NDArray[np.int64], reached: float = -math.inf) -> _Ranks:
-        return rank(cells, models=models, points=points, least=reached - MARGIN)
-
     quick = quick_scorer(index, view, scores, north_sigma=north_sigma)
+    models, points = index.observer_offsets if off_centre else (index.models, np.zeros((1, 2)))
+
+    def choose(cells: NDArray[np.int64], reached: float) -> _Ranks:
+        return prior[cells] + quick(cells, reached - MARGIN - prior[cells]), []
+
+    def rank(cells: NDArray[np.int64], reached: float) -> _Ranks:
+        return _score_cells(
+            index,
+            view,
+            cells,
+            models=models,
+            points=points,
+            scores=scores,
+            prior=prior[cells],
+            north_sigma=north_sigma,
+            least=reached - MARGIN,
+        )
+
     chosen = promising_cells(total.astype(np.float32), min(CHOSEN_FROM, len(total)))
     chosen = chosen[total[chosen] > -np.inf]
-    nearer = _rank_best(
-        lambda cells, reached: (quick(cells, reached - MARGIN - prior[cells]), []),
-        chosen,
-        total[chosen],
-        prior,
-        count=CHOSEN_FROM,
-        first=FIRST_CHOSEN,
-        # The first scores of few detections are upper bounds.
-        bounds=max(map(len, view.split()), default=0) <= FIRST_DETECTIONS,
-    )
-    chosen, before, move = nearer.cells, nearer.after, nearer.move
-    ranked = _rank_best(exact, chosen, before, prior, count=count, first=FIRST_RERANKED)
-    move += ranked.move
+    # First scores of few detections are upper bounds.
+    few = max(map(len, view.split()), default=0) <= FIRST_DETECTIONS
+    nearer = _rank_best(choose, chosen, total[chosen], first=FIRST_CHOSEN, bounds=few)
+    chosen, before = nearer.cells, nearer.after
+    ranked = _rank_best(rank, chosen, before, first=FIRST_RERANKED, count=count)
     # The other cells change by as much as a sample of them.
+    move = nearer.move + ranked.move
     loglik, reached = scores.loglik + np.float64(move), log_sum(ranked.after)
     left = np.ones(len(chosen), np.bool_)
     left[ranked.order] = False
     live = total > min(ranked.after.max(), total.max()) - NEGLIGIBLE
     live[chosen] = False
     rest = np.flatnonzero(live)
-    for cells, old, change in ((chosen[left], before[left], ranked.move), (rest, total[rest], move)):
-        changes: NDArray[np.float64] | float = change
-        if len(cells) and log_sum(old) + change > reached + LOG_LEAST_SHARE:
-            changes = _changes(
-                lambda part: exact(part)[0] + prior[part], cells, old, size=sample // len(points)
-            )
+    for cells, old, usual in ((chosen[left], before[left], ranked.move), (rest, total[rest], move)):
+        changes: NDArray[np.float64] | float = usual
+        if len(cells) and log_sum(old) + usual > reached + LOG_LEAST_SHARE:
+            changes = _changes(rank, cells, old, size=sample // len(points))
         loglik[cells] = old + changes - prior[cells]
     loglik[ranked.cells] = ranked.after - prior[ranked.cells]
-    headings = []
+    headings: list[NDArray[np.float32] | None] = []
     for heading, turn in zip(scores.headings, ranked.turns, strict=True):
         if heading is None:
             headings.append(None)
             continue
-        headings.append(heading.copy())
-        headings[-1][ranked.cells] = signed_degrees(turn)
+        exact = heading.copy()
+        exact[ranked.cells] = signed_degrees(turn)
+        headings.append(exact)
     return CellScores(loglik=loglik, headings=tuple(headings))
 
 
 class _Ranked(NamedTuple):
     """Cells that were scored again, of those that were given.
 
-    `order` has their positions among these, `before` and `after` their log-likelihoods with the
-    prior, `turns` the turns of each photo, and `move` is the change of the last batch.
+    `order` has their positions among these, `after` their scores and `turns` the turns of each
+    photo; `move` is the change of the last batch.
     """
 
     cells: NDArray[np.int64]
@@ -439,29 +443,25 @@ def _rank_best(
     rank: Callable[[NDArray[np.int64], float], _Ranks],
     cells: NDArray[np.int64],
     before: NDArray[np.float64],
-    prior: NDArray[np.float64],
     *,
-    count: int,
     first: int,
+    count: int | None = None,
     bounds: bool = False,
 ) -> _Ranked:
     """Score the best of some cells again: the `first` of them, then more and more up to `count`.
 
-    `rank` returns log-likelihoods and turns of cells; `before` is their score with the prior. If
-    these are upper `bounds`, the end is where the other cells are negligible, and otherwise where
-    the last batch is.
+    Scores are log-likelihoods with the prior: `before`, and what `rank` returns, with turns, for
+    cells and the best score so far. If those before are upper `bounds`, the end is where all other
+    cells are negligible, and otherwise where the last batch is.
     """
     order = np.argsort(-before, kind="stable")[:count]
     after, turns, size, move, best = np.empty(0), [], 0, 0.0, -math.inf
     while size < len(order):
         batch = order[size : max(first, 2 * size)]
-        part = cells[batch]
-        scores, own_turns = rank(part, best)
-        scores = scores + prior[part]
-        after, size = np.append(after, scores), size + len(part)
+        scores, own_turns = rank(cells[batch], best)
+        after, size = np.append(after, scores), size + len(batch)
         turns.append(own_turns)
-        reached, best = log_sum(scores), max(best, scores.max())
-        move = float(reached - log_sum(before[batch]))
+        best, move = float(after.max()), log_sum(scores) - log_sum(before[batch])
         others = before[order[size:]] if bounds else scores
         if size > first and log_sum(others) < log_sum(after) + LOG_LEAST_SHARE:
             break
@@ -470,7 +470,7 @@ def _rank_best(
 
 
 def _changes(
-    rank: Callable[[NDArray[np.int64]], NDArray[np.float64]],
+    rank: Callable[[NDArray[np.int64], float], _Ranks],
     cells: NDArray[np.int64],
     before: NDArray[np.float64],
     *,
@@ -478,20 +478,20 @@ def _changes(
 ) -> NDArray[np.float64]:
     """Return how much the scores of some cells change, by a sample of `size` of them.
 
-    `rank` returns the new scores of cells, and `before` are the old ones, both with the prior.
+    The scores are those of `_rank_best`.
     """
     # More of the likely cells than of the others, and the change of the chance by window.
     pool = np.arange(0, len(cells), max(1, len(cells) // (POOL * size)))
     pool = pool[np.argsort(-before[pool], kind="stable")]
     ranks = np.unique(np.geomspace(1, len(pool), size).astype(np.int64)) - 1
     sample = pool[ranks]
-    new, old, window = rank(cells[sample]), before[sample], size // WINDOWS
+    new, old, window = rank(cells[sample], -math.inf)[0], before[sample], size // WINDOWS
     moves, levels = [], []
     for low in range(0, len(sample), window):
         part = slice(low, low + window)
         moves.append(log_sum(new[part]) - log_sum(old[part]))
         levels.append(old[part].mean())
-    return np.interp(before, levels[::-1], moves[::-1])
+    return np.asarray(np.interp(before, levels[::-1], moves[::-1]))
 
 
 def _score_cells(
@@ -502,10 +502,14 @@ def _score_cells(
     models: _Models,
     points: NDArray[np.float64],
     scores: CellScores,
+    prior: NDArray[np.float64],
     north_sigma: float,
-    least: float = -math.inf,
+    least: float,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Return the log-likelihood of some cells, and the likeliest turns of the photos in each."""
+    """Return the log-likelihood of some cells with the prior, and the likeliest turns in each.
+
+    It is the mean over some points in each cell; an upper bound where it is surely below `least`.
+    """
     from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba, 0.25 s
 
     views = (
@@ -527,7 +531,7 @@ def _score_cells(
             views,
             *models,
             turns=point_turns,
-            log_prior=chances,
+            log_prior=chances + np.repeat(prior, len(points))[:, None],
             # A place that does not fit one photo may fit the others.
             group=len(points) if len(scores.headings) == 1 else 1,
             least=least if len(scores.headings) == 1 else -math.inf,
@@ -537,4 +541,4 @@ def _score_cells(
         likeliest.append(turns[np.arange(len(cells)), best])
         total += np.logaddexp.reduce(logliks, axis=2)
     total *= photo_power(len(likeliest), index.noise)
-    return np.logaddexp.reduce(total, axis=1) - math.log(len(points)), likeliest
+    return prior + np.logaddexp.reduce(total, axis=1) - math.log(len(points)), likeliest

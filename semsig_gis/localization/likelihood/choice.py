@@ -51,11 +51,16 @@ def quick_scorer(
 
     def score(cells: NDArray[np.int64], least: NDArray[np.float64]) -> NDArray[np.float64]:
         # A cell that does not fit one photo, or one turn, may fit the others.
-        total, each = np.zeros(len(cells)), least if len(photos) == 1 else np.full(len(cells), -np.inf)
+        total = np.zeros(len(cells))
+        each = (
+            least - math.log(len(NEAR_TURNS)) if len(photos) == 1 else np.full(len(cells), -np.inf)
+        )
         for row, heading, sigma in zip(rows, scores.headings, sigmas, strict=True):
-            turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + NEAR_TURNS
-            prior = np.zeros(1) if heading is None else turn_logs(turns, step, sigma)
-            logliks = _by_turn(index, row, cells, turns, each - math.log(len(NEAR_TURNS)))
+            turns, prior = np.zeros((len(cells), 1)), np.zeros(1)
+            if heading is not None:
+                turns = heading[cells, None] + NEAR_TURNS
+                prior = turn_logs(turns, step, sigma)
+            logliks = _by_turn(index, row, cells, turns, each)
             total += np.logaddexp.reduce(logliks + prior, axis=1)
         return total * power
 
@@ -94,7 +99,7 @@ def _log_product(values: NDArray[np.float32]) -> float:
 
 
 @compiled_sums
-def _associate_cells(  # noqa: C901, PLR0912, PLR0914, PLR0915, PLR0917 - a kernel takes no keywords
+def _associate_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     part: NDArray[np.int64],
     cells: NDArray[np.int64],
     least: NDArray[np.float64],
@@ -164,7 +169,7 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0914, PLR0915, PLR0917 - a kern
                     all_leaving += away
                     for detection in range(size):
                         floor[detection] += away * disc[detection] * naming[name + detection]
-            total += math.log(unseen) - all_leaving * photo.width + _log_product(floor)
+            total += math.log(unseen) - float(all_leaving) * photo.width + _log_product(floor)
             # Against false detections, with objects that came into range as others left it. The sum
             # over the detections one by one is an upper bound.
             for detection in range(size):
@@ -177,7 +182,7 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0914, PLR0915, PLR0917 - a kern
                     weights[first + detection] = messages[first + detection] = weight
                     sums[detection] += weight
             bound = total + _log_product(sums)
-            # A lower bound: for any numbers of 1 or more by object, their product times the sum
+            # A lower one: for any numbers of 1 or more by object, their product times the sum
             # with weights that are divided by them. Here they are the expected detections.
             if bound >= least[number]:
                 for detection in range(size):
@@ -189,7 +194,7 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0914, PLR0915, PLR0917 - a kern
                     for detection in range(size):
                         expected += weights[first + detection] * shares[detection]
                     expected = max(expected, one)
-                    factors *= expected
+                    factors *= float(expected)
                     for detection in range(size):
                         others[detection] += weights[first + detection] / expected
                 bound = min(bound, total + math.log(factors) + _log_product(others))

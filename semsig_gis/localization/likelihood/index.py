@@ -70,7 +70,6 @@ FIRST_DETECTIONS, FIRST_TURNED_DETECTIONS = 8, 16
 VERSION = 6  # increased whenever the same database and noise give other likelihoods
 POINTS_A_SIDE = 3  # of the grid of points in a cell at which the best cells are compared
 LEAST_DENSITY = 1e-12  # densities below count as 0: products of them would be slow to compute
-CELLS_A_THREAD = 256  # the fewest cells that are worth a thread, for points off their centres
 LAPS = np.arange(-3, 4)  # 180 degrees of deviation reach three turns
 
 
@@ -152,11 +151,6 @@ class LikelihoodIndex(Displayed):
         points = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
         noise = cell_noise(place_noise(self.noise, step), step / side)
         return database_tables(self.database, noise), points
-
-    @cached_property
-    def _quarters(self) -> tuple[NoiseLevels, NDArray[np.float64]]:
-        models, points = self._points(2)
-        return NoiseLevels.of(mean_table(*models), self._extents), points
 
     @cached_property
     def _extents(self) -> _Extents:
@@ -241,42 +235,6 @@ class LikelihoodIndex(Displayed):
         loglik *= photo_power(len(headings), self.noise)
         return CellScores(loglik=loglik, headings=tuple(headings))
 
-    def off_centre_scorer(
-        self, view: View, *, north_sigma: float
-    ) -> Callable[[NDArray[np.int64]], NDArray[np.float64]]:
-        """Return a function of cells: the log-likelihood of a view, averaged over points in each.
-
-        Each of the four points is scored as in `scores`, but an observer off the centre sees every
-        object shifted by the same offset.
-        """
-        from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba, 0.25 s
-
-        levels, points = self._quarters
-        scorers = [
-            photo_scorer(photo, levels, own_sigma(photo, north_sigma)) for photo in view.split()
-        ]
-        power = photo_power(len(scorers), self.noise)
-
-        def score(cells: NDArray[np.int64]) -> NDArray[np.float64]:
-            loglik = np.empty(len(cells))
-
-            def score_part(part: NDArray[np.int64]) -> None:
-                views = visible_objects_off_centre(
-                    self.database, cells[slice(*part)], points, neighbours=False
-                )
-                bins = (views.bearings * (BINS / FULL_TURN)).astype(np.uint16) % np.uint16(BINS)
-                units = levels.table.scale.units(views.distances)
-                objects = levels.objects(views.offsets, views.codes, bins, units)
-                total = sum(scorer(objects)[0] for scorer in scorers) * power
-                by_point = np.asarray(total, np.float64).reshape(-1, len(points))
-                mean = np.logaddexp.reduce(by_point, axis=1) - math.log(len(points))
-                loglik[slice(*part)] = mean
-
-            share_rows(score_part, len(cells), least=CELLS_A_THREAD)
-            return loglik
-
-        return score
-
     def _scores_by_counts(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the scores of a query without bearings, given the class rows of its objects."""
         from semsig_gis.localization.likelihood.kernels import count_types  # noqa: PLC0415 - numba, 0.25 s
@@ -316,15 +274,15 @@ def photo_scorer(
     arrays, model = photo_rows(photo, levels, share=share), levels.model
     model = model._replace(detected=model.detected * np.float32(share))
     if before is not None:  # which has the clutter
-        arrays = arrays._replace(base=arrays.base + float(levels.table.clutter.sum()) * arrays.width)
+        arrays = arrays._replace(
+            base=arrays.base + float(levels.table.clutter.sum()) * arrays.width
+        )
     if north_sigma == 0.0:
 
         def score(objects: BinnedObjects) -> _PhotoScores:
             size = len(objects.offsets) - 1
             totals, products = np.empty(size), np.empty(size)
-            share_rows(
-                lambda part: scan(part, objects, model, arrays, totals, products), size
-            )
+            share_rows(lambda part: scan(part, objects, model, arrays, totals, products), size)
             totals += np.log(products)
             return totals.astype(np.float32), None
 
@@ -349,9 +307,7 @@ def photo_scorer(
         scores, best = np.empty(size, np.float32), np.empty(size, np.int16)
         old, new = before or nothing, after or nothing
         share_rows(
-            lambda part: scan_turned(
-                part, objects, model, turned, prior, old, new, scores, best
-            ),
+            lambda part: scan_turned(part, objects, model, turned, prior, old, new, scores, best),
             size,
         )
         return scores, best * np.float32(FULL_TURN / TURNS)
@@ -360,7 +316,7 @@ def photo_scorer(
 
 
 def _is_plain(photo: View) -> bool:
-    """Whether a photo is a full turn of objects of classes, without ranges and errors of its own."""
+    """Whether a photo is a full turn of known classes, without ranges and errors of its own."""
     unknown = photo.codes is None or photo.scores is not None or (photo.codes == WILDCARD).any()
     rough = photo.bearing_errors is not None and np.nan_to_num(photo.bearing_errors).any()
     ranged = photo.ranges is not None and not np.isnan(photo.ranges).all()

@@ -395,7 +395,7 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no ke
 
 
 @compiled_sums
-def scan_profiles(  # noqa: PLR0914, PLR0915, PLR0917 - a kernel is one function
+def scan_profiles(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     part: NDArray[np.int64],
     objects: BinnedObjects,
     model: LevelModel,
@@ -448,7 +448,9 @@ def scan_profiles(  # noqa: PLR0914, PLR0915, PLR0917 - a kernel is one function
             if profile > 0:
                 weight = odds * own[length + kind]
                 for turn in range(64):
-                    profiles[profile * twice + np.uint64(turn)] += weight * rows[row + np.uint64(turn)]
+                    profiles[profile * twice + np.uint64(turn)] += (
+                        weight * rows[row + np.uint64(turn)]
+                    )
             # Objects that came into range as others left it, in any direction.
             away = near * leaving[kind * levels + level]
             all_leaving += away
@@ -456,10 +458,10 @@ def scan_profiles(  # noqa: PLR0914, PLR0915, PLR0917 - a kernel is one function
             floors[0] += away * other[length + kind]
             if profile > 0:
                 floors[profile] += away * own[length + kind]
-        total += math.log(unseen) - all_leaving
-        for profile in range(len(floors)):
+        total += math.log(unseen) - float(all_leaving)
+        for number in range(len(floors)):
             for turn in range(64):
-                profiles[profile * 128 + 64 + turn] = profiles[profile * 128 + turn]
+                profiles[number * 128 + 64 + turn] = profiles[number * 128 + turn]
         product[:] = photo.chances
         for detection in range(len(photo.sectors)):
             sector = np.uint64(photo.sectors[detection])
@@ -470,7 +472,7 @@ def scan_profiles(  # noqa: PLR0914, PLR0915, PLR0917 - a kernel is one function
                 product[turn] *= (
                     floor + profiles[first + np.uint64(turn)] + profiles[sector + np.uint64(turn)]
                 )
-            if detection % 4 == 3:  # four sums are below 1e38
+            if (detection + 1) % 4 == 0:  # four sums are below 1e38
                 most = np.float32(0.0)
                 for turn in range(64):
                     most = max(most, product[turn])

@@ -56,26 +56,20 @@ class _CellObjects(NamedTuple):
 
 
 def visible_objects_off_centre(
-    database: SignatureDatabase,
-    cells: NDArray[np.int64],
-    points: NDArray[np.float64],
-    *,
-    neighbours: bool = True,
+    database: SignatureDatabase, cells: NDArray[np.int64], points: NDArray[np.float64]
 ) -> VisibleObjects:
     """Return the views from points off the centres of some cells, computed only from the cells.
 
     The points, shape (p, 2), are metres to the east and north of the centre, less than a cell; that
     of cell i and point j is view ``i * len(points) + j``. Objects that come into range there are
-    taken from the neighbouring cells on that side. If one of these cells is missing, or
-    `neighbours` are not wanted, objects that are out of range there are kept, at their distance, as
-    are extended things and landmarks, which are taken only from the cell itself.
+    taken from the neighbouring cells on that side. If one of these cells is missing, objects that
+    are out of range there are kept, at their distance, as are extended things and landmarks, which
+    are taken only from the cell itself.
     """
     # The row of each neighbour, -1 where there is none; the cells of a column follow each other.
     columns, rows = database.columns[cells].astype(np.int64), database.rows[cells].astype(np.int64)
     ids, around = database.cell_ids, np.full((len(cells), len(AROUND)), -1)
-    around[:, OWN] = cells
-    sides = np.unique(np.append(np.sign(points[:, 0]), 0)).astype(np.int64) if neighbours else []
-    for east in map(int, sides):
+    for east in np.unique(np.append(np.sign(points[:, 0]), 0)).astype(np.int64).tolist():
         number = np.searchsorted(ids, cell_ids(columns + east, rows - 1))
         for north in (-1, 0, 1):
             there = ids[np.minimum(number, len(ids) - 1)] == cell_ids(columns + east, rows + north)
@@ -123,9 +117,7 @@ def visible_objects_off_centre(
     )
 
 
-def _nearest_units(
-    metres: NDArray[np.float64], step: float, *, radius: float
-) -> NDArray[np.int64]:
+def _nearest_units(metres: NDArray[np.float64], step: float, *, radius: float) -> NDArray[np.int64]:
     """Return `_CellObjects.nearest` for objects with a range of at least `radius` metres."""
     away = step * np.hypot(*np.transpose(AROUND))
     direction = np.degrees(np.arctan2(*np.transpose(AROUND)))

@@ -202,8 +202,7 @@ def photo_loglik(
     ahead, reached = 0, least + margin
     if whole:
         ahead = min(FIRST_PLACES, groups)
-        first = reached
-        share_rows(lambda part: fill(part, first), ahead, least=a_thread)
+        share_rows(lambda part: fill(part, least + margin), ahead, least=a_thread)
         reached = float((logliks[:, :ahead] + prior[:ahead]).max(initial=reached))
     share_rows(lambda part: fill(part + ahead, reached), groups - ahead, least=a_thread)
     return np.asarray(np.logaddexp.reduce(logliks, axis=0))

@@ -37,7 +37,6 @@ class TurnPrior(NamedTuple):
         chances = chances[likely] / chances[likely].sum()
         return cls(int(turns[likely[0]]), np.pad(chances, (0, -len(chances) % TURN_BLOCK)))
 
-
     def by_turn(self) -> NDArray[np.float32]:
         """Return the chances of all turns from 0 on."""
         chances = np.zeros(TURNS, np.float32)

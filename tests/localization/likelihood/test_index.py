@@ -13,20 +13,17 @@ from hypothesis import strategies as st
 from noisy_cells import NOTHING, noise_specs, parts_of, random_database, random_query
 from scipy.stats import binom, poisson
 from small_city import small_city
-from view_oracle import cell_loglik, random_view, scene_of, set_loglik, turned_loglik
+from view_oracle import cell_loglik, random_view, set_loglik
 from worlds import random_town
 
-from semsig_gis.core import Signature, consecutive
+from semsig_gis.core import Signature
 from semsig_gis.localization import (
     TURNS,
     IncrementalIndex,
     build_index,
-    cell_noise,
-    database_tables,
     index_fingerprint,
     named_noise,
     promising_cells,
-    visible_objects_off_centre,
 )
 from semsig_gis.localization.likelihood import incremental
 from semsig_gis.observation import Photo, View
@@ -123,48 +120,6 @@ def test_scores_are_summed_over_turns_by_their_chances(
     rows = np.rint((result.heading + 180.0) / TURN).astype(int)
     reached = each[rows, np.arange(len(database))]
     assert reached == pytest.approx(each.max(axis=0), abs=2e-2)
-
-
-@settings(max_examples=10)
-@given(SEEDS, noise_specs(), SECTORS)
-def test_off_centre_scores_are_means_over_points(
-    seed: int, noise: NoiseSpec, sectors: tuple[tuple[float, float], ...]
-) -> None:
-    town = TOWN.database
-    # Against steps of 0.7 degrees, and of metres at the edge of range.
-    sigma = max(noise.bearing_sigma, 8.0)
-    noise = replace(noise, bearing_sigma=sigma, clutter=5.0, clutter_shares={}, position_sigma=0.0)
-    view = random_view(town, np.random.default_rng(seed), size=3, photos=[Photo(sectors=sectors)])
-    view = replace(view, ranges=None, range_errors=None)
-    cells = np.random.default_rng(seed).choice(len(town), 8, replace=False)
-    step = town.grid.step
-    points = np.array([[east, north] for north in (-1, 1) for east in (-1, 1)]) * step / 4.0
-    views = visible_objects_off_centre(town, cells, points)
-    (spec,) = cell_noise(noise, step / 2.0).specs
-    (table,), _ = database_tables(town, spec)
-    codes = town.present_codes.tolist()
-    # The objects seen from a point, as a database of its own.
-    units = np.rint(views.distances * 255.0 / town.reach).clip(0, 255)
-    each = []
-    for point in range(len(points)):
-        rows = np.arange(len(cells)) * len(points) + point
-        part = consecutive(views.offsets[rows], views.lengths[rows])
-        there = replace(
-            town.select(cells),
-            offsets=np.append(0, np.cumsum(views.lengths[rows])),
-            codes=views.codes[part],
-            bearing_units=np.floor(views.bearings[part] * 20.0).astype(np.uint16),
-            distance_units=units[part].astype(np.uint8),
-        )
-        scenes = [scene_of(there, row, spec, table) for row in range(len(cells))]
-        north = [[(0.0, 1.0)]]
-        each.append([turned_loglik(scene, view, codes, north, set_loglik) for scene in scenes])
-    expected = np.logaddexp.reduce(each, axis=0) - math.log(4)
-    result = build_index(town, cell_noise(noise, step)).off_centre_scorer(view, north_sigma=0.0)(
-        cells
-    )
-    assert result == pytest.approx(expected, abs=0.5 * len(view))
-    assert np.median(np.abs(result - expected)) < 0.1 * len(view)
 
 
 @settings(max_examples=20)
