@@ -190,35 +190,28 @@ class Posterior(Displayed):
         Its centre is, of the thousand likeliest cells without those in earlier places, the one with
         the most chance left within the radius, of equals the likeliest.
         """
-        database, chances = self.database, self.chances
+        from semsig_gis.localization.likelihood.place_kernels import take_places  # noqa: PLC0415 - numba, 0.25 s
+
+        database = self.database
         likely = self.likeliest(LIKELIEST_CELLS)
         order = np.argsort(likely)
         sums = np.empty(len(likely))
         sums[order] = self.mass_within(radius, likely[order])
-        columns = database.columns[likely].astype(np.int64)
-        rows = database.rows[likely].astype(np.int64)
-        steps, east, north = self._circle(radius)
-        remaining, used = chances[likely] > 0, np.zeros(len(chances), np.bool_)
-        places: list[tuple[int, int, float]] = []
-        while len(places) < count and remaining.any():
-            # Rounded, so that equal sums stay equal.
-            best = int(np.where(remaining, np.round(sums, 9), -1.0).argmax())
-            column, row = columns[best] + east, rows[best]
-            low = np.searchsorted(database.cell_ids, cell_ids(column, row - north), side="left")
-            high = np.searchsorted(database.cell_ids, cell_ids(column, row + north), side="right")
-            inside = np.concatenate([np.arange(*ends) for ends in zip(low, high, strict=True)])
-            inside = inside[~used[inside]]
-            used[inside] = True
-            own = chances[inside]
-            places.append((int(likely[best]), int(inside[own.argmax()]), float(own.sum())))
-            away = (columns - columns[best]) ** 2 + (rows - rows[best]) ** 2
-            remaining &= away > steps**2
-            near = np.flatnonzero(remaining & (away <= (2.0 * steps) ** 2))
-            inside, own = inside[own > 0], own[own > 0]
-            apart = (columns[near, None] - database.columns[inside]) ** 2
-            apart += (rows[near, None] - database.rows[inside]) ** 2
-            sums[near] -= (apart <= steps**2) @ own
-        return Places(*map(np.array, zip(*places, strict=True)))
+        most = min(count, len(likely))
+        places = Places(np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most))
+        number = take_places(
+            likely,
+            database.columns[likely].astype(np.int64),
+            database.rows[likely].astype(np.int64),
+            sums,
+            database.cell_ids,
+            self.chances,
+            self._circle(radius),
+            int(cell_ids(1, 0)),
+            *places,
+        )
+        filled: list[Any] = [values[:number] for values in places]
+        return Places(*filled)
 
     def _circle(self, radius: float) -> tuple[float, NDArray[np.int64], NDArray[np.int64]]:
         """Return a radius in cells, the columns in its circle, and the last row in each."""
