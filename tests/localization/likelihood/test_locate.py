@@ -31,6 +31,7 @@ from semsig_gis.localization import (
     locate_route,
     locate_versions,
     named_noise,
+    place_noise,
     position_prior,
     posterior,
     refine,
@@ -184,6 +185,37 @@ def test_refinement_finds_places_between_the_viewpoints() -> None:
             assert (np.diff(location.candidates["chance"]) <= 1e-9).all()
     plain, close = np.median(errors, axis=0)
     assert close < 1.0 < plain < 8.0
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.sampled_from(LONG), st.tuples(st.floats(-5, 5), st.floats(-5, 5)), st.integers(2, 20))
+def test_the_likeliest_cells_are_divided_as_if_all_were(
+    cell: int, away: tuple[float, float], most: int
+) -> None:
+    query = seen_from(CITY.xy[cell] + np.array(away))
+    query = query.select(np.arange(min(most, len(query))))
+    if not len(query):
+        return
+    plain = locate(WIDE, query, surely_here=True)
+    location = locate(WIDE, query, store=STORE, refined=True, surely_here=True)
+    cells = plain.posterior.likeliest(len(CITY))
+    parts = refine(
+        query,
+        CITY.xy[cells],
+        place_noise(WIDE.noise, CITY.grid.step),
+        store=STORE,
+        step=CITY.grid.step,
+        radius=CITY.spec.radius,
+        log_prior=np.log(plain.chances[cells]) - plain.loglik[cells],
+    )
+    # At most a thousand cells are divided; the others keep their chances.
+    chances = plain.chances.copy()
+    divided = np.unique(cells[parts.cells])
+    sums = np.bincount(cells[parts.cells], parts.chances, len(CITY))
+    chances[divided] = sums[divided] * chances[divided].sum()
+    assert location.chances == pytest.approx(chances, abs=0.01)
+    oracle = Posterior(database=CITY, chances=chances).best_place()
+    assert location.chance == pytest.approx(oracle[1], abs=0.01)
 
 
 def test_explanations_name_the_street_objects() -> None:
