@@ -246,8 +246,10 @@ def _places_in(
     begin = np.searchsorted(ids, cell_ids(column, south[box]))
     end = np.searchsorted(ids, cell_ids(column, north[box]), side="right")
     box, place = np.repeat(box, end - begin), order[consecutive(begin, end - begin)]
-    inside = (places[place] >= bounds[box, :2]).all(axis=1)
-    inside &= (places[place] <= bounds[box, 2:]).all(axis=1)
+    # By column, because numpy takes several times longer for both at once.
+    at_x, at_y = x[place], y[place]
+    inside = (at_x >= bounds[:, 0][box]) & (at_x <= bounds[:, 2][box])
+    inside &= (at_y >= bounds[:, 1][box]) & (at_y <= bounds[:, 3][box])
     row, place = rows[box[inside]], place[inside]
     inside = shapely.intersects_xy(polygons[row], x[place], y[place])
     return row[inside], place[inside]

@@ -126,7 +126,6 @@ def cross_walls(
     -1 if there is none, do not count.
     """
     states = np.empty(len(starts), np.uint8)
-    starts, ends = starts - grid.origin, ends - grid.origin
 
     def cross(part: NDArray[np.int64]) -> None:
         rows = slice(*part)
@@ -144,11 +143,12 @@ def _cross_walls(  # noqa: C901
     grid: WallGrid,
     states: NDArray[np.uint8],
 ) -> None:
-    """Write the result of `cross_walls` to `states`; places are relative to the grid's origin."""
+    """Write the result of `cross_walls` to `states`."""
     size, walls, owner = grid.size, grid.walls, grid.owner
+    west, south = grid.origin
     for pair in range(len(starts)):
-        ax, ay = starts[pair]
-        bx, by = ends[pair]
+        ax, ay = starts[pair, 0] - west, starts[pair, 1] - south
+        bx, by = ends[pair, 0] - west, ends[pair, 1] - south
         dx, dy = bx - ax, by - ay
         own = around[pair]
         state = CLEAR
