@@ -48,7 +48,9 @@ _KINDS: dict[str, tuple[SeenFrom, str, float]] = {
     "north unknown": ("anywhere", "view:360, compass:360", math.inf),
 }
 _NEAR_M, _NEAR_CHANCE = 1.0, 0.01
+_RIGHT_M = 50.0
 _LEAST_CHANCE = 0.1  # of a place that is likely
+_LEAST_STATED = 1e-6  # chance of what happened
 _LIKELY = f"chance of {_LEAST_CHANCE:g} or more"
 
 
@@ -92,9 +94,11 @@ def answers(
         distortions = parse_chain(f"detector:{NOISE.name}, {chain}", noises={NOISE.name: NOISE})
         spec_of_views = QuerySpec(number=4 * views, seen_from=seen_from, distortions=distortions)
         queries = [
-            query.asked.signature for query in draw_queries(database, spec_of_views, store=store)
+            (query.asked.signature, query.xy)
+            for query in draw_queries(database, spec_of_views, store=store)
+            if len(query.asked.signature)
         ]
-        for number, query in enumerate([query for query in queries if len(query)][:views]):
+        for number, (query, xy) in enumerate(queries[:views]):
             noise = named_noise(usual_noise(query))
             if seen_from != "cells":
                 noise = cell_noise(noise, database.grid.step)
@@ -111,6 +115,7 @@ def answers(
                     "refined": refined,
                     "objects": len(query),
                     "xy": [round(metres, 3) for metres in location.xy],
+                    "right": math.dist((location.answer.x, location.answer.y), xy) <= _RIGHT_M,
                     "chance": round(location.chance, 5),
                     "elsewhere": round(location.elsewhere, 5),
                     "heading": location.estimate.heading,
@@ -144,6 +149,17 @@ def _compare(old: Path, new: Path) -> None:
                 f"{view}: {was['objects']} objects, {math.dist(was['xy'], now['xy']):.1f} m, "
                 f"chance {was['chance']:.3f} {now['chance']:.3f}"
             )
+    for name, rows in (("old", before), ("new", after)):
+        right, here = ([row[what] for row in rows.values()] for what in ("right", "chance"))
+        stated = [
+            row["chance"] * (1.0 if row["right"] else -1.0) + (not row["right"])
+            for row in rows.values()
+        ]
+        score = sum(math.log(max(chance, _LEAST_STATED)) for chance in stated) / len(rows)
+        print(
+            f"{name}: {sum(right)} of {len(rows)} within {_RIGHT_M:g} m, {sum(here):.1f} expected, "
+            f"mean logarithm of the stated chance of right or wrong {score:.4f}"
+        )
     for group in (*_KINDS, _LIKELY, "all"):
         if views := counts[group, "views"]:
             shares = (

@@ -305,7 +305,7 @@ def associate_pairs(
 
 RERANKED = 500
 """Default number of cells that are re-ranked."""
-CHOSEN_FROM = 8192  # cells of which those to re-rank are chosen
+CHOSEN_FROM = 16  # those to re-rank are chosen from this multiple of their number
 # Cells in the first batch of each; then as many again, twice as many, ...
 FIRST_CHOSEN, FIRST_RERANKED = 512, 32
 # Points in the other cells at which a sample of these is scored: usually, and for a quick answer.
@@ -393,22 +393,22 @@ def rerank(
             least=reached - MARGIN,
         )
 
-    chosen = promising_cells(total.astype(np.float32), min(CHOSEN_FROM, len(total)))
-    chosen = chosen[total[chosen] > -np.inf]
+    choice = promising_cells(total.astype(np.float32), min(CHOSEN_FROM * count, len(total)))
+    choice = choice[total[choice] > -np.inf]
     # First scores of few detections are upper bounds.
     few = max(map(len, view.split()), default=0) <= FIRST_DETECTIONS
-    nearer = _rank_best(choose, chosen, total[chosen], first=FIRST_CHOSEN, bounds=few)
-    chosen, before = nearer.cells, nearer.after
-    ranked = _rank_best(rank, chosen, before, first=FIRST_RERANKED, count=count)
+    nearer = _rank_best(choose, choice, total[choice], first=FIRST_CHOSEN, bounds=few)
+    choice, before = nearer.cells, nearer.after
+    ranked = _rank_best(rank, choice, before, first=FIRST_RERANKED, count=count)
     # The other cells change by as much as a sample of them.
     move = nearer.move + ranked.move
     loglik, reached = scores.loglik + np.float64(move), log_sum(ranked.after)
-    left = np.ones(len(chosen), np.bool_)
+    left = np.ones(len(choice), np.bool_)
     left[ranked.order] = False
     live = total > min(ranked.after.max(), total.max()) - NEGLIGIBLE
-    live[chosen] = False
+    live[choice] = False
     rest = np.flatnonzero(live)
-    for cells, old, usual in ((chosen[left], before[left], ranked.move), (rest, total[rest], move)):
+    for cells, old, usual in ((choice[left], before[left], ranked.move), (rest, total[rest], move)):
         changes: NDArray[np.float64] | float = usual
         if len(cells) and log_sum(old) + usual > reached + LOG_LEAST_SHARE:
             changes = _changes(rank, cells, old, size=sample // len(points))
@@ -451,7 +451,7 @@ def _rank_best(
     """Score the best of some cells again: the `first` of them, then more and more up to `count`.
 
     Scores are log-likelihoods with the prior: `before`, and what `rank` returns, with turns, for
-    cells and the best score so far. If those before are upper `bounds`, the end is where all other
+    cells and the best score before them. If those before are upper `bounds`, the end is where all other
     cells are negligible, and otherwise where the last batch is.
     """
     order = np.argsort(-before, kind="stable")[:count]

@@ -125,7 +125,7 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
     group_starts = (model.group_of * (levels * bins)).astype(np.uint64)
     size, all_bins, all_levels = np.uint64(blocks * lanes), np.uint64(bins), np.uint64(levels)
     in_sectors = len(masses) > 0
-    one = np.float32(1.0)
+    one_f = np.float32(1.0)
     most = 0
     for number in range(part[0], part[1]):
         most = max(most, offsets[cells[number] + 1] - offsets[cells[number]])
@@ -142,7 +142,7 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
         for way in range(shifts.shape[1]):
             shift = all_bins - np.uint64(shifts[number, way])
             total, unseen, all_leaving, used = photo.base, 1.0, np.float32(0.0), np.uint64(0)
-            floor[:] = one
+            floor[:] = one_f
             # The weights of pairs: one thing, against a miss.
             for entry in range(low, low + count):
                 kind, bin_ = np.uint64(kinds[entry]), np.uint64(object_bins[entry])
@@ -150,9 +150,9 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
                 place = group_starts[kind] + level * all_bins + (bin_ + shift) % all_bins
                 near = detected[length + kind]
                 chance = near * remaining[kind * all_levels + level]
-                missed = one - chance
+                missed = one_f - chance
                 if in_sectors:
-                    missed = one - chance * masses[place]
+                    missed = one_f - chance * masses[place]
                 unseen *= missed
                 if unseen < 1.0 / _LARGE:
                     total += math.log(unseen)
@@ -173,8 +173,8 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
             # Against false detections, with objects that came into range as others left it. The sum
             # over the detections one by one is an upper bound.
             for detection in range(size):
-                shares[detection] = one / floor[detection]
-                sums[detection] = one
+                shares[detection] = one_f / floor[detection]
+                sums[detection] = one_f
             for entry in range(used):
                 first = entry * size
                 for detection in range(size):
@@ -182,18 +182,18 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
                     weights[first + detection] = messages[first + detection] = weight
                     sums[detection] += weight
             bound = total + _log_product(sums)
-            # A lower one: for any numbers of 1 or more by object, their product times the sum
+            # A lower bound: for any numbers of 1 or more by object, their product times the sum
             # with weights that are divided by them. Here they are the expected detections.
             if bound >= least[number]:
                 for detection in range(size):
-                    shares[detection] = one / sums[detection]
-                    others[detection] = one
+                    shares[detection] = one_f / sums[detection]
+                    others[detection] = one_f
                 factors = 1.0
                 for entry in range(used):
                     first, expected = entry * size, np.float32(0.0)
                     for detection in range(size):
                         expected += weights[first + detection] * shares[detection]
-                    expected = max(expected, one)
+                    expected = max(expected, one_f)
                     factors *= float(expected)
                     for detection in range(size):
                         others[detection] += weights[first + detection] / expected
@@ -205,14 +205,14 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
             # of an object at once.
             for _ in range(_ROUNDS):
                 for entry in range(used):
-                    first, here = entry * size, one
+                    first, here = entry * size, one_f
                     for detection in range(size):
-                        rest = max(sums[detection] - messages[first + detection], one)
+                        rest = max(sums[detection] - messages[first + detection], one_f)
                         shares[detection] = weights[first + detection] / rest
                         here += shares[detection]
                     at_object[entry] = here
                     for detection in range(size):
-                        rest = max(here - shares[detection], one)
+                        rest = max(here - shares[detection], one_f)
                         message = weights[first + detection] / rest
                         sums[detection] += message - messages[first + detection]
                         messages[first + detection] = message
@@ -221,7 +221,7 @@ def _associate_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
             for entry in range(used):
                 first = entry * size
                 for detection in range(size):
-                    rest = max(sums[detection] - messages[first + detection], one)
+                    rest = max(sums[detection] - messages[first + detection], one_f)
                     shares[detection] = rest / (rest + messages[first + detection])
                 total += math.log(at_object[entry]) + _log_product(shares)
             totals[number, way] = total

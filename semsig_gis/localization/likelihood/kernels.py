@@ -417,7 +417,7 @@ def scan_profiles(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no 
     profile_of = photo.profile_of
     step_bits = np.uint64(int(math.log2(photo.rows.shape[2]) + 0.5))
     level_bits = step_bits + np.uint64(6)
-    turns, twice, one = np.uint64(64), np.uint64(128), np.float32(1.0)
+    turns, twice, one_f = np.uint64(64), np.uint64(128), np.float32(1.0)
     bins = turns * steps - np.uint64(1)
     profiles = np.empty((profile_of.max() + 1) * 128, np.float32)  # two turns each
     floors = np.empty(profile_of.max() + 1, np.float32)
@@ -433,11 +433,11 @@ def scan_profiles(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no 
             level, bin_ = bin_ >> level_bits, bin_ & bins
             near = detected[length + kind]
             chance = near * remaining[kind * levels + level]
-            unseen *= one - chance
+            unseen *= one_f - chance
             if unseen < 1.0 / _LARGE:
                 total += math.log(unseen)
                 unseen = 1.0
-            odds = chance / (one - chance)
+            odds = chance / (one_f - chance)
             # The density at each turn from the bearing of the object on.
             row = (group_of[kind] * levels + level) * steps + (bin_ & (steps - np.uint64(1)))
             row = row * twice + turns - (bin_ >> step_bits)
@@ -466,7 +466,7 @@ def scan_profiles(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no 
         for detection in range(len(photo.sectors)):
             sector = np.uint64(photo.sectors[detection])
             profile = np.uint64(photo.profiles[detection])
-            floor = one + floors[profile] + floors[0]
+            floor = one_f + floors[profile] + floors[0]
             first = profile * twice + sector
             for turn in range(64):
                 product[turn] *= (
