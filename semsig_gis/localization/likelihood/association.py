@@ -451,8 +451,8 @@ def _rank_best(
     """Score the best of some cells again: the `first` of them, then more and more up to `count`.
 
     Scores are log-likelihoods with the prior: `before`, and what `rank` returns, with turns, for
-    cells and the best score before them. If those before are upper `bounds`, the end is where all other
-    cells are negligible, and otherwise where the last batch is.
+    cells and the best score before them. If those before are upper `bounds`, the end is where all
+    other cells are negligible, and otherwise where the last batch is.
     """
     order = np.argsort(-before, kind="stable")[:count]
     after, turns, size, move, best = np.empty(0), [], 0, 0.0, -math.inf
