@@ -344,20 +344,30 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
         raise DatabaseError(
             "two of the databases contain the same cell; join databases of different cells."
         )
+    lengths = np.concatenate([part.lengths for part in parts])
+    offsets = np.append(0, np.cumsum(lengths[order]))
+    starts = np.empty(len(ids), np.int64)
+    starts[order] = offsets[:-1]
     arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("lengths", *CELL_ARRAYS)
+        name: np.concatenate([getattr(part, name) for part in parts])[order] for name in CELL_ARRAYS
     }
-    for name in dict.fromkeys(name for part in parts for name in part.entry_arrays):
-        arrays[name] = np.concatenate([entry_values(part, name) for part in parts])
-    joined = replace(
+    # The objects of one part after the other go to their places: all at once would take several
+    # times the memory of the result.
+    names = dict.fromkeys(name for part in parts for name in part.entry_arrays)
+    arrays |= {name: np.empty(offsets[-1], entry_values(first, name).dtype) for name in names}
+    cells = 0
+    for part in parts:
+        places = consecutive(starts[cells : cells + len(part)], part.lengths)
+        for name in names:
+            arrays[name][places] = entry_values(part, name)
+        cells += len(part)
+    return replace(
         first,
-        offsets=np.append(0, np.cumsum(arrays.pop("lengths"))),
+        offsets=offsets,
         licenses=tuple(dict.fromkeys(line for part in parts for line in part.licenses)),
         notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
         **arrays,
     )
-    return joined if (np.diff(order) == 1).all() else joined.select(order)
 
 
 def entry_values(database: SignatureDatabase, name: str) -> NDArray[Any]:
