@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import statistics
 import subprocess
 import sys
@@ -33,8 +34,11 @@ __all__ = ["comparisons"]
 # The city, the number of queries of a batch, and of single queries that are timed.
 _SIZES = {"full": (PARIS_LIKE, 1000, 15), "small": (CitySpec(size=300.0), 5, 2)}
 _SEED = 20
-_WARM, _WARM_REFINED = 15.0, 4.0
-_COLD, _MEMORY = 1 / 1.3, 1 / 1.5  # ratios to edit+edit
+# Bars: ratios to edit distances, for answers from anywhere in a cell, refined and explained ones,
+# and on the grid; of north unknown to north known; and of many queries to edit distances.
+_ANYWHERE, _REFINED, _ON_GRID = 1.0, 0.5, 2.0
+_NORTH_UNKNOWN, _BATCH = 1 / 3, 1 / 4
+_COLD_MS, _MEMORY_MB = 700.0, 300.0
 _LOADING = 1 / 0.7
 _MOST_HELP_MS = 500.0
 _EXPLAINED = 3
@@ -93,15 +97,24 @@ def _warm_rows(
     def peer(repeat: int) -> None:
         cdist([types[repeat]], texts, scorer=Levenshtein.distance, dtype=np.uint8)
 
+    on_grid = build_index(database, named_noise("generic"))
+
     def answered(repeat: int) -> None:
         locate(index, queries[repeat])
 
     def refined(repeat: int) -> None:
         locate(index, queries[repeat], store=store, refined=True, explained=_EXPLAINED)
 
+    def answered_on_grid(repeat: int) -> None:
+        locate(on_grid, queries[repeat])
+
+    def turned(repeat: int) -> None:
+        locate(index, queries[repeat], north_sigma=math.inf)
+
     for what, ours, bar in (
-        ("", answered, _WARM),
-        (" with refinement and explanations", refined, _WARM_REFINED),
+        ("", answered, _ANYWHERE),
+        (" with refinement and explanations", refined, _REFINED),
+        (" on the grid", answered_on_grid, _ON_GRID),
     ):
         yield compare(
             f"the whole answer by likelihood{what}, {len(database):,} cells",
@@ -111,6 +124,14 @@ def _warm_rows(
             repeats=len(queries),
             bar=bar,
         )
+    yield compare(
+        f"the whole answer by likelihood, north unknown, {len(database):,} cells",
+        turned,
+        answered,
+        peer_name="the same with north known",
+        repeats=len(queries),
+        bar=_NORTH_UNKNOWN,
+    )
 
 
 def _batch_row(
@@ -131,6 +152,7 @@ def _batch_row(
         lambda _: cdist(types, texts, scorer=Levenshtein.distance, dtype=np.uint8),
         peer_name="rapidfuzz.process.cdist(queries, cells), edit distance of types",
         repeats=1,
+        bar=_BATCH,
     )
 
 
@@ -153,8 +175,7 @@ def _cold_rows(
         lambda _: _process(*plain, *_DISTANCE),
         peer_name="semsig localize by edit+edit",
         repeats=repeats,
-        bar=_COLD,
-    )
+    ).at_most(_COLD_MS)
     runs = [
         [_timed_command(*plain[2:], *method) for _ in range(repeats)] for method in ((), _DISTANCE)
     ]
@@ -165,8 +186,8 @@ def _cold_rows(
         ours=by_likelihood,
         peer=by_distance,
         peer_name="semsig localize by edit+edit",
-        bar=_MEMORY,
-    )
+        bar=None,
+    ).at_most(_MEMORY_MB)
     yield Comparison(
         name=f"files beside a database after queries by likelihood, {cells}",
         unit="files",
