@@ -115,7 +115,7 @@ def answers(
                     "refined": refined,
                     "objects": len(query),
                     "xy": [round(metres, 3) for metres in location.xy],
-                    "right": math.dist((location.answer.x, location.answer.y), xy) <= _RIGHT_M,
+                    "right": math.dist(location.xy, xy) <= _RIGHT_M,
                     "chance": round(location.chance, 5),
                     "elsewhere": round(location.elsewhere, 5),
                     "heading": location.estimate.heading,
