@@ -125,6 +125,25 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
         assert (row["paper"] is None) == (row["name"].split(",")[0] not in FUSIONS | SINGLES.keys())
 
 
+def test_answers_are_saved_and_compared(tmp_path: Path) -> None:
+    out = tmp_path / "answers.json"
+    lines = []
+    for options in (
+        [str(out), "--size", "small", "--city", "Paris-like", "--views", "1"],
+        ["--compare", str(out), str(out)],
+    ):
+        result = subprocess.run(
+            [sys.executable, "-W", "error", "-m", "benchmarks.same_answers", *options],
+            cwd=Path(__file__).parents[2],
+            check=True,
+            stdout=subprocess.PIPE,
+            text=True,
+            timeout=6 * PATIENCE_S,
+        )
+        lines = result.stdout.splitlines()
+    assert lines[-1] == "all: of 9 answers, the same place 100.0%, chance 100.0%, elsewhere 100.0%"
+
+
 @pytest.mark.usefixtures("browser", "map_files")
 def test_screenshots_of_pages_are_written(tmp_path: Path) -> None:
     subprocess.run(
