@@ -308,8 +308,7 @@ RERANKED = 500
 CHOSEN_FROM = 16  # those to re-rank are chosen from this multiple of their number
 # Cells in the first batch of each; then as many again, twice as many, ...
 FIRST_CHOSEN, FIRST_RERANKED = 512, 32
-# Points in the other cells at which a sample of these is scored: usually, and for a quick answer.
-SAMPLE, QUICK_SAMPLE = 4608, 768
+SAMPLE, QUICK_SAMPLE = 512, 256  # of the other cells: usually, and for a quick answer
 # Batches end when the last one holds less than this share of the chance. Other cells that together
 # hold less are not sampled.
 LOG_LEAST_SHARE = math.log(1e-3)
@@ -411,7 +410,7 @@ def rerank(
     for cells, old, usual in ((choice[left], before[left], ranked.move), (rest, total[rest], move)):
         changes: NDArray[np.float64] | float = usual
         if len(cells) and log_sum(old) + usual > reached + LOG_LEAST_SHARE:
-            changes = _changes(rank, cells, old, size=sample // len(points))
+            changes = _changes(rank, cells, old, size=sample)
         loglik[cells] = old + changes - prior[cells]
     loglik[ranked.cells] = ranked.after - prior[ranked.cells]
     headings: list[NDArray[np.float32] | None] = []
