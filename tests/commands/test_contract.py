@@ -133,7 +133,6 @@ def test_every_command_has_a_use_here() -> None:
     assert set(LINES) == set(COMMANDS)
 
 
-@pytest.mark.usefixtures("unchanged")
 def test_a_command_is_in_the_module_of_its_name() -> None:
     code = (
         "import sys\n"
@@ -151,6 +150,7 @@ def test_a_command_is_in_the_module_of_its_name() -> None:
         find_command("nonsense")
 
 
+@pytest.mark.usefixtures("unchanged")
 @pytest.mark.parametrize(("name", "field"), fields(lambda field: field.option.reads))
 def test_missing_file_is_refused(name: str, field: Field, run: Run) -> None:
     changes, words = OTHERS.get((name, field.name), ({}, "nowhere.parquet"))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 LEANS = 300  # trials to fit the temperature of the likelihoods of signatures
 # Re-ranked cells of a trial: the likeliest, and a sample of the others.
-RERANKED, RERANKED_SAMPLE = 100, 256
+RERANKED, RERANKED_SAMPLE = 128, 256
 HOPELESS = 20.0  # nats; cells farther below the likeliest cell are omitted from the sums
 
 

@@ -208,7 +208,7 @@ class LikelihoodIndex(Displayed):
             share = min(most / max(len(photo), 1), 1.0)
             if share < 1.0:
                 photo = photo.select(np.linspace(0, len(photo) - 1, most).round().astype(np.int64))
-            scorer = photo_scorer if sigma == 0.0 or not _is_plain(photo) else profile_scorer
+            scorer = photo_scorer if sigma == 0.0 or not is_plain(photo) else profile_scorer
             return scorer(photo, self.levels, sigma, share=share)(self.objects)
 
         return self.scores_by_photo(query, north_sigma, score_photo)
@@ -315,7 +315,7 @@ def photo_scorer(
     return score_turned
 
 
-def _is_plain(photo: View) -> bool:
+def is_plain(photo: View) -> bool:
     """Whether a photo is a full turn of known classes, without ranges and errors of its own."""
     unknown = photo.codes is None or photo.scores is not None or (photo.codes == WILDCARD).any()
     rough = photo.bearing_errors is not None and np.nan_to_num(photo.bearing_errors).any()

@@ -50,7 +50,12 @@ from semsig_gis.localization.likelihood.explain import (
     explain,
     explain_cell,
 )
-from semsig_gis.localization.likelihood.index import CellScores, photo_power
+from semsig_gis.localization.likelihood.index import (
+    FIRST_TURNED_DETECTIONS,
+    CellScores,
+    is_plain,
+    photo_power,
+)
 from semsig_gis.localization.likelihood.posterior import (
     DIVIDED_PARTS,
     holding,
@@ -597,7 +602,12 @@ class LikelihoodLocator:
         """
         reading = self._reading(query)
         index = reading.index
-        if self.incremental is not None and index is self.index:
+        # A growing photo is scored again only in part, if this gives the first scores.
+        in_part = index is self.index and all(
+            len(photo) <= FIRST_TURNED_DETECTIONS and not is_plain(photo)
+            for photo in View.of(reading.view).split()
+        )
+        if self.incremental is not None and in_part:
             return self.incremental.scores(reading.view, north_sigma=self.north_sigma)
         return index.first_scores(reading.view, north_sigma=self.north_sigma)
 

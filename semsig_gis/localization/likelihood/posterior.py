@@ -47,7 +47,7 @@ NO_CHANCE = 1e-16  # smaller ones add less than 1e-9 bits to the entropy of a la
 LIKELIEST_CELLS = 1000
 """Cells among which the best place is searched."""
 MANTISSA_BITS = 52  # of a float64; its exponent is above them
-IMPOSSIBLE = 60.0  # nats below the likeliest cell at which the chance is 0
+IMPOSSIBLE = 700.0  # nats below the likeliest cell at which the chance is 0
 
 
 class Places(NamedTuple):
