@@ -94,7 +94,7 @@ MOST_PLACES = 100
 """Most places of a region that are counted."""
 ROUNDING = 1e-9
 TINY = np.finfo(np.float64).tiny
-UNREFINED = 3e-4  # share of the chance of the likeliest cells that are not divided
+UNREFINED = 1e-6  # share of the chance of the likeliest cells that are not divided
 LEAST_REFINED = 0.02
 """Least chance of a version of a query for a search between the viewpoints."""
 
@@ -603,11 +603,14 @@ class LikelihoodLocator:
         reading = self._reading(query)
         index = reading.index
         # A growing photo is scored again only in part, if this gives the first scores.
-        in_part = index is self.index and all(
-            len(photo) <= FIRST_TURNED_DETECTIONS and not is_plain(photo)
-            for photo in View.of(reading.view).split()
-        )
-        if self.incremental is not None and in_part:
+        if (
+            self.incremental is not None
+            and index is self.index
+            and all(
+                len(photo) <= FIRST_TURNED_DETECTIONS and not is_plain(photo)
+                for photo in View.of(reading.view).split()
+            )
+        ):
             return self.incremental.scores(reading.view, north_sigma=self.north_sigma)
         return index.first_scores(reading.view, north_sigma=self.north_sigma)
 

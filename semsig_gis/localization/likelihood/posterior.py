@@ -47,7 +47,6 @@ NO_CHANCE = 1e-16  # smaller ones add less than 1e-9 bits to the entropy of a la
 LIKELIEST_CELLS = 1000
 """Cells among which the best place is searched."""
 MANTISSA_BITS = 52  # of a float64; its exponent is above them
-IMPOSSIBLE = 700.0  # nats below the likeliest cell at which the chance is 0
 
 
 class Places(NamedTuple):
@@ -101,7 +100,7 @@ class Posterior(Displayed):
 
     @cached_property
     def _powers(self) -> NDArray[np.int64]:
-        """Binary exponent of the chance of each possible cell, above 0."""
+        """Binary exponent of the chance of each possible cell, from 0."""
         return self.chances[self._possible].view(np.int64) >> MANTISSA_BITS
 
     def _top(self, amount: float, *, share: bool = False) -> NDArray[np.int64]:
@@ -207,7 +206,7 @@ class Posterior(Displayed):
             database.cell_ids,
             self.chances,
             self._circle(radius),
-            int(cell_ids(1, 0)),
+            ROW_SPAN,
             *places,
         )
         filled: list[Any] = [values[:number] for values in places]
@@ -316,9 +315,7 @@ def posterior(
         raise InputError("a likelihood or a prior is not a number or is infinite; give logarithms.")
     if top == -np.inf:
         raise InputError("the prior excludes every cell that the query may be in; widen it.")
-    likely = np.flatnonzero(total > top - IMPOSSIBLE)
-    chances = np.zeros(total.size)
-    chances[likely] = np.exp(total[likely] - top)
+    chances = np.exp(total - top)
     prior = math.log(total.size) if log_prior is None else log_sum(log_prior)
     return Posterior(
         database=database,
