@@ -23,7 +23,6 @@ import numpy as np
 from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, log_sum, signed_degrees
 from semsig_gis.database import visible_objects_in
 from semsig_gis.localization.likelihood.index import (
-    FIRST_DETECTIONS,
     CellScores,
     own_sigma,
     photo_power,
@@ -394,9 +393,7 @@ def rerank(
 
     choice = promising_cells(total.astype(np.float32), min(CHOSEN_FROM * count, len(total)))
     choice = choice[total[choice] > -np.inf]
-    # First scores of few detections are upper bounds.
-    few = max(map(len, view.split()), default=0) <= FIRST_DETECTIONS
-    nearer = _rank_best(choose, choice, total[choice], first=FIRST_CHOSEN, bounds=few)
+    nearer = _rank_best(choose, choice, total[choice], first=FIRST_CHOSEN)
     choice, before = nearer.cells, nearer.after
     ranked = _rank_best(rank, choice, before, first=FIRST_RERANKED, count=count)
     # The other cells change by as much as a sample of them.
@@ -445,13 +442,11 @@ def _rank_best(
     *,
     first: int,
     count: int | None = None,
-    bounds: bool = False,
 ) -> _Ranked:
     """Score the best of some cells again: the `first` of them, then more and more up to `count`.
 
     Scores are log-likelihoods with the prior: `before`, and what `rank` returns, with turns, for
-    cells and the best score before them. If those before are upper `bounds`, the end is where all
-    other cells are negligible, and otherwise where the last batch is.
+    cells and the best score before them. The end is where the last batch is negligible.
     """
     order = np.argsort(-before, kind="stable")[:count]
     after, turns, size, move, best = np.empty(0), [], 0, 0.0, -math.inf
@@ -461,8 +456,7 @@ def _rank_best(
         after, size = np.append(after, scores), size + len(batch)
         turns.append(own_turns)
         best, move = float(after.max()), log_sum(scores) - log_sum(before[batch])
-        others = before[order[size:]] if bounds else scores
-        if size > first and log_sum(others) < log_sum(after) + LOG_LEAST_SHARE:
+        if size > first and log_sum(scores) < log_sum(after) + LOG_LEAST_SHARE:
             break
     joined = [np.concatenate(each) for each in zip(*turns, strict=True)]
     return _Ranked(cells[order[:size]], order[:size], after, joined, move)

@@ -27,9 +27,14 @@ from semsig_gis.core import (
 )
 from semsig_gis.localization.likelihood.photo import PhotoTable
 from semsig_gis.localization.likelihood.records import (
+    BINS,
+    COARSE_BINS,
+    COARSE_LEVELS,
+    DISTANCE_LEVELS,
     LANES,
     BinnedObjects,
     LevelModel,
+    PhotoGains,
     PhotoRows,
     TurnedPhoto,
 )
@@ -54,17 +59,14 @@ if TYPE_CHECKING:
     _PhotoScores = tuple[NDArray[np.float32], NDArray[np.float32] | None]
     _Scorer = Callable[[BinnedObjects], _PhotoScores]
 
-BINS = 512
-"""Bearing steps of an object."""
 FINE = 8 * BINS
 """Bearing steps of a detection."""
 EXACT_GROUPS = 4  # classes with more different errors are grouped by similar ones
 ERROR_RATIO = 1.3  # of errors that count as similar
 EXTENT_RATIO = 3.0  # of errors of extended things that do
-DISTANCE_LEVELS = 64
-"""Distances at which errors are computed."""
 
-FIRST_DETECTIONS, FIRST_TURNED_DETECTIONS = 8, 16
+LENGTH_ODDS = 2.0  # ratio of odds up to which lengths of signatures share a row
+FIRST_DETECTIONS, FIRST_TURNED_DETECTIONS = LANES, 16
 """Detections of a photo by which cells are chosen, if its north is known and if not."""
 
 VERSION = 6  # increased whenever the same database and noise give other likelihoods
@@ -208,7 +210,9 @@ class LikelihoodIndex(Displayed):
             share = min(most / max(len(photo), 1), 1.0)
             if share < 1.0:
                 photo = photo.select(np.linspace(0, len(photo) - 1, most).round().astype(np.int64))
-            scorer = photo_scorer if sigma == 0.0 or not is_plain(photo) else profile_scorer
+            if sigma == 0.0:
+                return gain_scorer(photo, self.levels, share=share)(self.objects)
+            scorer = profile_scorer if is_plain(photo) else photo_scorer
             return scorer(photo, self.levels, sigma, share=share)(self.objects)
 
         return self.scores_by_photo(query, north_sigma, score_photo)
@@ -313,6 +317,65 @@ def photo_scorer(
         return scores, best * np.float32(FULL_TURN / TURNS)
 
     return score_turned
+
+
+def gain_scorer(photo: View, levels: NoiseLevels, *, share: float = 1.0) -> _Scorer:
+    """Return about `photo_scorer` for a photo of at most `LANES` detections and known north.
+
+    The sum over the objects is only its largest term, which is read from a table with wider steps
+    of bearing and distance. So an object that explains several detections adds less.
+    """
+    from semsig_gis.localization.likelihood.kernels import gain_rows, scan_gains  # noqa: PLC0415 - numba, 0.25 s
+
+    arrays, model = photo_rows(photo, levels, share=share), levels.model
+    length_of, lengths = levels.length_groups
+    remaining, leaving = (
+        part.reshape(len(part), COARSE_LEVELS, -1).mean(axis=2)
+        for part in (model.remaining, model.leaving)
+    )
+    near = model.detected[..., None] * np.float32(share)
+    chances, away = near * remaining, near * leaving * np.float32(arrays.width)
+    # Classes with the same chances share a row of the table.
+    names = arrays.naming[lengths]
+    logs = np.log(np.maximum(names, np.finfo(np.float32).tiny)).round(3)
+    numbers = np.concatenate([chances[lengths], away[lengths], logs], axis=2)
+    keys = [
+        (group, numbers[:, kind].tobytes()) for kind, group in enumerate(model.group_of.tolist())
+    ]
+    distinct = list(dict.fromkeys(keys))
+    kinds, kind_of = [keys.index(key) for key in distinct], [distinct.index(key) for key in keys]
+    groups, some = model.group_of[kinds], np.ix_(lengths, kinds)
+    gains = np.empty((len(lengths), len(kinds), COARSE_LEVELS, COARSE_BINS, LANES), np.uint8)
+    scratch = np.empty(LANES, np.float32)
+    inside = np.empty((len(levels.sigma), COARSE_LEVELS, COARSE_BINS), np.float32)
+    gain_rows(
+        arrays.rows[0],
+        arrays.masses if arrays.masses.size else arrays.masses[:0],
+        groups,
+        chances[some],
+        names[:, kinds],
+        (scratch, scratch.view(np.int32)),
+        gains,
+        inside,
+    )
+    in_sectors = arrays.masses.size > 0
+    photo_gains = PhotoGains(
+        gains=gains,
+        length_of=length_of,
+        kind_of=np.array(kind_of, np.uint64),
+        missed=np.log(1.0 - chances) - away,
+        inside=np.log(1.0 - chances[some][..., None] * inside[groups]) - away[some][..., None]
+        if in_sectors
+        else np.empty((0, 0, 0, 0), np.float32),
+        base=arrays.base,
+    )
+
+    def score(objects: BinnedObjects) -> _PhotoScores:
+        scores = np.empty(len(objects.offsets) - 1, np.float32)
+        share_rows(lambda part: scan_gains(part, objects, photo_gains, scores), len(scores))
+        return scores, None
+
+    return score
 
 
 def is_plain(photo: View) -> bool:
@@ -529,6 +592,19 @@ class NoiseLevels:
         offsets = offsets.view()
         offsets.flags.writeable = False  # as those of a file, or kernels are compiled twice
         return BinnedObjects(offsets, self.table.row_of.astype(np.uint8)[codes], level_bins)
+
+    @cached_property
+    def length_groups(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
+        """The group of each length, and a length of each group: those with about the same odds."""
+        detected = self.model.detected
+        chances = np.hstack([detected, self.table.misnamed[: len(detected)]]).clip(1e-3, 1.0 - 1e-3)
+        logs, starts = np.log(chances / (1.0 - chances)), [0]
+        for length, row in enumerate(logs):
+            if np.abs(row - logs[starts[-1]]).max() > math.log(LENGTH_ODDS):
+                starts.append(length)
+        ends = [*starts[1:], len(logs)]
+        groups = np.repeat(np.arange(len(starts)), np.subtract(ends, starts))
+        return groups.astype(np.uint64), (np.array(starts) + ends) // 2
 
     def rows(self, photo: PhotoTable) -> NDArray[np.float32]:
         """Return the density of each detection by group, level and bearing of an object."""

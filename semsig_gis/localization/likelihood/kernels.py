@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core import FULL_TURN, compiled, compiled_sums
-from semsig_gis.localization.likelihood.records import LANES
+from semsig_gis.localization.likelihood.records import (
+    BINS,
+    COARSE_BINS,
+    COARSE_LEVELS,
+    DISTANCE_LEVELS,
+    LANES,
+)
 from semsig_gis.localization.likelihood.turns import TURN_BLOCK
 
 if TYPE_CHECKING:
@@ -17,14 +23,24 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.records import (
         BinnedObjects,
         LevelModel,
+        PhotoGains,
         PhotoRows,
         TurnedPhoto,
     )
     from semsig_gis.localization.likelihood.turns import TurnPrior, TurnScores
 
+# Unsigned constants, all powers of two: divisions by them are shifts.
+_ALL_BINS, _COARSE_BINS, _COARSE_LEVELS = map(np.uint64, (BINS, COARSE_BINS, COARSE_LEVELS))
+_BINS_A_BIN = np.uint64(BINS // COARSE_BINS)
+_BINS_A_LEVEL = np.uint64(BINS * DISTANCE_LEVELS // COARSE_LEVELS)
 _LARGE = 1e200  # products beyond this, or below its inverse, become logarithms
 _BINS = 1024  # bins of the histogram that finds the best scores
 _BINS_A_NAT = np.float32(16.0)
+# Gains are logarithms in eighths of an octave: the bits of a float of 32 bits from its third digit
+# on are left out.
+_ONE_BITS = np.int32(np.float32(1.0).view(np.int32))
+_DIGITS_LEFT_OUT = np.int32(20)
+_A_GAIN = np.float32(math.log(2.0) / 8.0)
 
 
 @compiled
@@ -181,6 +197,102 @@ def scan(  # noqa: PLR0917 - a kernel takes no keywords
                 product = 1.0
         totals[place] = total - leaving_sum * photo.width
         products[place] = product
+
+
+@compiled
+def gain_rows(  # noqa: PLR0917 - a kernel takes no keywords
+    rows: NDArray[np.float32],
+    masses: NDArray[np.float32],
+    groups: NDArray[np.int64],
+    chances: NDArray[np.float32],
+    naming: NDArray[np.float32],
+    scratch: tuple[NDArray[np.float32], NDArray[np.int32]],
+    gains: NDArray[np.uint8],
+    means: NDArray[np.float32],
+) -> None:
+    """Fill `gains`, shape (lengths, kinds, levels, bins, LANES), of the record `PhotoGains`.
+
+    `rows`, shape (groups, levels, bins, LANES), and `masses`, which is empty for a full turn, have
+    finer levels and bins; the mean of these masses is written to `means`, shape (groups, levels,
+    bins). `groups` is by kind, the `chances` of detection by length, kind and level, `naming` by
+    length, kind and lane. `scratch` is the same memory as floats and as integers.
+    """
+    floats, bits = scratch
+    lengths, kinds, levels, bins, lanes = gains.shape
+    many_levels, many_bins = rows.shape[1] // levels, rows.shape[2] // bins
+    share = np.float32(1.0 / (many_levels * many_bins))
+    sums, one_f = np.empty(lanes, np.float32), np.float32(1.0)
+    for group in range(len(rows)):
+        for level in range(levels):
+            for bin_ in range(bins):
+                sums[:] = np.float32(0.0)
+                mass = np.float32(0.0)
+                for fine in range(level * many_levels, (level + 1) * many_levels):
+                    for step in range(bin_ * many_bins, (bin_ + 1) * many_bins):
+                        for lane in range(lanes):
+                            sums[lane] += rows[group, fine, step, lane]
+                        mass += masses[group, fine, step] if len(masses) else one_f
+                mass *= share
+                means[group, level, bin_] = mass
+                for kind in range(kinds):
+                    if groups[kind] != group:
+                        continue
+                    for length in range(lengths):
+                        chance = chances[length, kind, level]
+                        odds = share * chance / (one_f - chance * mass)
+                        for lane in range(lanes):
+                            floats[lane] = one_f + odds * sums[lane] * naming[length, kind, lane]
+                        # The first bits of a float are about its logarithm.
+                        for lane in range(lanes):
+                            gain = (bits[lane] - _ONE_BITS) >> _DIGITS_LEFT_OUT
+                            gains[length, kind, level, bin_, lane] = min(gain, 255)
+
+
+@compiled
+def scan_gains(
+    part: NDArray[np.int64],
+    objects: BinnedObjects,
+    photo: PhotoGains,
+    scores: NDArray[np.float32],
+) -> None:
+    """Fill `scores` of the places ``part[0]`` to ``part[1] - 1``, about as `scan`.
+
+    Each detection adds the logarithm of the largest term of its sum over the objects, not of all.
+    """
+    offsets, kinds, object_bins = objects.offsets, objects.kinds, objects.bins
+    # Flat arrays and unsigned indices, as in `scan`.
+    gains, missed, inside = photo.gains.ravel(), photo.missed.ravel(), photo.inside.ravel()
+    length_of, kind_of = photo.length_of, photo.kind_of
+    all_kinds, classes = np.uint64(photo.gains.shape[1]), np.uint64(len(kind_of))
+    longest, in_sectors = np.uint64(len(length_of) - 1), len(inside) > 0
+    for place in range(part[0], part[1]):
+        low, high = np.uint64(offsets[place]), np.uint64(offsets[place + 1])
+        length = min(high - low, longest)
+        above = length_of[length] * all_kinds
+        length *= classes
+        score = np.float32(photo.base)
+        a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = np.uint8(0)
+        for entry in range(low, high):
+            kind, bin_ = np.uint64(kinds[entry]), np.uint64(object_bins[entry])
+            level = bin_ // _BINS_A_LEVEL
+            row = (above + kind_of[kind]) * _COARSE_LEVELS + level
+            row = row * _COARSE_BINS + bin_ % _ALL_BINS // _BINS_A_BIN
+            if in_sectors:
+                score += inside[row]
+            else:
+                score += missed[(length + kind) * _COARSE_LEVELS + level]
+            row *= np.uint64(LANES)
+            a0 = max(a0, gains[row])
+            a1 = max(a1, gains[row + np.uint64(1)])
+            a2 = max(a2, gains[row + np.uint64(2)])
+            a3 = max(a3, gains[row + np.uint64(3)])
+            a4 = max(a4, gains[row + np.uint64(4)])
+            a5 = max(a5, gains[row + np.uint64(5)])
+            a6 = max(a6, gains[row + np.uint64(6)])
+            a7 = max(a7, gains[row + np.uint64(7)])
+        total = np.int32(a0) + np.int32(a1) + np.int32(a2) + np.int32(a3)
+        total += np.int32(a4) + np.int32(a5) + np.int32(a6) + np.int32(a7)
+        scores[place] = score + np.float32(total) * _A_GAIN
 
 
 @compiled
@@ -518,45 +630,6 @@ def promising_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.int64
             best[filled] = cell
             filled += 1
     return best
-
-
-@compiled
-def _position(ids: NDArray[np.int64], value: int) -> int:
-    """Return the number of ids below a value; they are ascending."""
-    low, size = 0, len(ids)
-    while size > 0:
-        half = size // 2
-        if ids[low + half] < value:
-            low += half + 1
-            size -= half + 1
-        else:
-            size = half
-    return low
-
-
-@compiled
-def sum_circles(  # noqa: PLR0917 - a kernel takes no keywords
-    centres: NDArray[np.int64],
-    ids: NDArray[np.int64],
-    before: NDArray[np.float64],
-    columns: NDArray[np.int64],
-    rows: NDArray[np.int64],
-    sums: NDArray[np.float64],
-) -> None:
-    """Fill `sums` with the chance in a circle around each of some cells.
-
-    `centres` are ids of cells. `ids` are those of all cells with a chance, ascending, and `before`
-    the sum of the chances before each of them and of all. The circle has the ids of a centre plus
-    `columns`, and up to `rows` more or less in each column.
-    """
-    for place in range(len(centres)):
-        total = 0.0
-        for number in range(len(columns)):
-            middle = centres[place] + columns[number]
-            low = _position(ids, middle - rows[number])
-            high = low + _position(ids[low:], middle + rows[number] + 1)
-            total += before[high] - before[low]
-        sums[place] = total
 
 
 @compiled

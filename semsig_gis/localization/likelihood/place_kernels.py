@@ -1,4 +1,4 @@
-"""The loop that takes distinct places from the chances of cells."""
+"""Compiled loops over the chances of cells: sums in circles, and distinct places."""
 
 from __future__ import annotations
 
@@ -12,6 +12,66 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 DIGITS = 1e9  # sums of chances that are equal when rounded to nine decimals are equal
+
+
+@compiled
+def sum_powers(
+    chances: NDArray[np.float64],
+    powers: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    sums: NDArray[np.float64],
+) -> None:
+    """Add the number and the sum of chances above 0 to `counts` and `sums`, by their `powers`."""
+    for cell in range(len(chances)):
+        if chances[cell] > 0.0:
+            counts[powers[cell]] += 1
+            sums[powers[cell]] += chances[cell]
+
+
+@compiled
+def _position(ids: NDArray[np.int64], value: int, start: int) -> int:
+    """Return the number of ids below a value, searched near `start`; they are ascending."""
+    if start > 0 and ids[start - 1] >= value:
+        start = 0
+    # Steps twice as long until the value is passed, then halves of the last one.
+    step, low, high = 1, start, start
+    while high < len(ids) and ids[high] < value:
+        low, high = high + 1, high + step
+        step *= 2
+    high = min(high, len(ids))
+    while low < high:
+        middle = (low + high) // 2
+        if ids[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def sum_circles(  # noqa: PLR0917 - a kernel takes no keywords
+    centres: NDArray[np.int64],
+    ids: NDArray[np.int64],
+    before: NDArray[np.float64],
+    columns: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    sums: NDArray[np.float64],
+) -> None:
+    """Fill `sums` with the chance in a circle around each of some cells.
+
+    `centres` are ids of cells; ascending ones are faster. `ids` are those of all cells, ascending,
+    and `before` the sum of the chances before each of them and of all. The circle has the ids of a
+    centre plus `columns`, and up to `rows` more or less in each column.
+    """
+    lows = np.zeros(len(columns), np.int64)
+    for place in range(len(centres)):
+        total = 0.0
+        for number in range(len(columns)):
+            middle = centres[place] + columns[number]
+            lows[number] = _position(ids, middle - rows[number], lows[number])
+            high = _position(ids, middle + rows[number] + 1, lows[number])
+            total += before[high] - before[lows[number]]
+        sums[place] = total
 
 
 @compiled

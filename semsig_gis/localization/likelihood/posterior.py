@@ -47,6 +47,7 @@ NO_CHANCE = 1e-16  # smaller ones add less than 1e-9 bits to the entropy of a la
 LIKELIEST_CELLS = 1000
 """Cells among which the best place is searched."""
 MANTISSA_BITS = 52  # of a float64; its exponent is above them
+LEAST_CHANCE = float(np.finfo(np.float64).smallest_subnormal)
 
 
 class Places(NamedTuple):
@@ -94,24 +95,25 @@ class Posterior(Displayed):
         }
 
     @cached_property
-    def _possible(self) -> NDArray[np.int64]:
-        """Row numbers of the cells of chance above 0."""
-        return np.flatnonzero(self.chances)
+    def _by_power(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The number and the chance of possible cells by the binary exponent of their chance."""
+        from semsig_gis.localization.likelihood.place_kernels import sum_powers  # noqa: PLC0415 - numba, 0.25 s
 
-    @cached_property
-    def _powers(self) -> NDArray[np.int64]:
-        """Binary exponent of the chance of each possible cell, from 0."""
-        return self.chances[self._possible].view(np.int64) >> MANTISSA_BITS
+        powers = 2 * np.finfo(np.float64).maxexp
+        by_power = np.zeros(powers, np.int64), np.zeros(powers)
+        chances = np.ascontiguousarray(self.chances, dtype=np.float64)
+        sum_powers(chances, chances.view(np.int64) >> MANTISSA_BITS, *by_power)
+        return by_power
 
     def _top(self, amount: float, *, share: bool = False) -> NDArray[np.int64]:
         """Return possible cells that include the likeliest ones up to an amount, in any order.
 
         The amount is a number of cells or a `share` of the chance. Sorting all takes longer.
         """
-        weights = self.chances[self._possible] if share else None
-        amounts = np.cumsum(np.bincount(self._powers, weights)[::-1])
+        amounts = np.cumsum(self._by_power[int(share)][::-1])
         power = len(amounts) - 1 - int(np.searchsorted(amounts, amount))
-        return self._possible[self._powers >= power]
+        least = np.array([max(power, 0) << MANTISSA_BITS]).view(np.float64)
+        return np.flatnonzero(self.chances >= max(float(least[0]), LEAST_CHANCE))
 
     def likeliest(self, count: int) -> NDArray[np.int64]:
         """Return the row numbers of the `count` likeliest cells, likeliest first."""
@@ -159,18 +161,18 @@ class Posterior(Displayed):
         """
         if not (math.isfinite(radius) and radius >= 0):
             raise InputError(f"a radius of {radius} m was given; give metres, 0 or more.")
-        from semsig_gis.localization.likelihood.kernels import sum_circles  # noqa: PLC0415 - numba, 0.25 s
+        from semsig_gis.localization.likelihood.place_kernels import sum_circles  # noqa: PLC0415 - numba, 0.25 s
 
         database = self.database
         centres = slice(None) if cells is None else cells
         columns = database.columns[centres].astype(np.int64)
         rows = database.rows[centres].astype(np.int64)
         # The cells are ordered by column and row: in each column, the circle is one slice.
-        ids = database.cell_ids[self._possible]
-        before = np.concatenate([[0.0], np.cumsum(self.chances[self._possible])])
-        total = np.empty(len(columns))
+        before, total = np.zeros(len(self.chances) + 1), np.empty(len(columns))
+        np.cumsum(self.chances, out=before[1:])
         _, east, north = self._circle(radius)
-        sum_circles(cell_ids(columns, rows), ids, before, ROW_SPAN * east, north, total)
+        ids = cell_ids(columns, rows)
+        sum_circles(ids, database.cell_ids, before, ROW_SPAN * east, north, total)
         return np.clip(total, 0.0, 1.0)
 
     def best_place(self, radius: float = 50.0) -> tuple[int, float]:

@@ -8,6 +8,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+BINS = 512
+"""Bearing steps of an object."""
+DISTANCE_LEVELS = 64
+"""Distances at which errors are computed."""
+COARSE_BINS, COARSE_LEVELS = 128, 16
+"""Bearing and distance steps of `kernels.scan_gains`."""
 LANES = 8
 """Detections that `kernels.scan` adds up together."""
 
@@ -53,6 +59,25 @@ class PhotoRows(NamedTuple):
     naming: NDArray[np.float32]
     disc: NDArray[np.float32]
     width: float
+    base: float
+
+
+class PhotoGains(NamedTuple):
+    """A photo of at most `LANES` detections of known north, for `kernels.scan_gains`.
+
+    `gains`, shape (lengths, kinds, levels, bins, LANES), are the logarithms, in eighths of an
+    octave, of 1 plus what an object adds to the sum of each detection. Lengths of signatures with
+    about the same chances share a row, `length_of`, and so do classes that the photo does not
+    distinguish, `kind_of`. `missed`, by length, class row and level, is the logarithm that an
+    object adds because it may be missed, and `inside`, shape (lengths, kinds, levels, bins), takes
+    its place if the photo is not a full turn. `base` is the score of a place without objects.
+    """
+
+    gains: NDArray[np.uint8]
+    length_of: NDArray[np.uint64]
+    kind_of: NDArray[np.uint64]
+    missed: NDArray[np.float32]
+    inside: NDArray[np.float32]
     base: float
 
 
