@@ -304,10 +304,10 @@ def associate_pairs(
 
 RERANKED = 500
 """Default number of cells that are re-ranked."""
-CHOSEN_FROM = 16  # those to re-rank are chosen from this multiple of their number
+CHOSEN_FROM = 8  # those to re-rank are chosen from this multiple of their number
 # Cells in the first batch of each; then as many again, twice as many, ...
-FIRST_CHOSEN, FIRST_RERANKED = 512, 32
-SAMPLE, QUICK_SAMPLE = 512, 256  # of the other cells: usually, and for a quick answer
+FIRST_CHOSEN, FIRST_RERANKED = 512, 16
+SAMPLE = 192  # of the other cells
 # Batches end when the last one holds less than this share of the chance. Other cells that together
 # hold less are not sampled.
 LOG_LEAST_SHARE = math.log(1e-3)

@@ -38,7 +38,7 @@ from semsig_gis.localization.answers import (
     query_notes,
 )
 from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
-from semsig_gis.localization.likelihood.association import QUICK_SAMPLE, SAMPLE, rerank
+from semsig_gis.localization.likelihood.association import rerank
 from semsig_gis.localization.likelihood.elsewhere import (
     area_chances,
     evidence_ratio,
@@ -638,7 +638,6 @@ class LikelihoodLocator:
             north_sigma=self.north_sigma,
             log_prior=log_prior,
             off_centre=not self.quick,
-            sample=QUICK_SAMPLE if self.quick else SAMPLE,
         )
         if reading.extra is None:
             return scores
