@@ -14,7 +14,7 @@ if the pairs form no loop, otherwise a little too small.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -22,11 +22,7 @@ import numpy as np
 
 from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, log_sum, signed_degrees
 from semsig_gis.database import visible_objects_in
-from semsig_gis.localization.likelihood.index import (
-    CellScores,
-    own_sigma,
-    photo_power,
-)
+from semsig_gis.localization.likelihood.index import own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.localization.likelihood.turns import turn_logs
 from semsig_gis.localization.noise.table import database_tables, extent_sigma
@@ -39,7 +35,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Signature
     from semsig_gis.database import SignatureDatabase, VisibleObjects
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex, _Models
+    from semsig_gis.localization.likelihood.index import CellScores, LikelihoodIndex, _Models
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.noise.table import NoiseTable
 
@@ -315,10 +311,10 @@ MARGIN = 20.0  # nats below the best cell at which an upper bound of a score is 
 NEGLIGIBLE = 30.0  # nats below the best re-ranked cell at which all cells together are negligible
 POOL = 16  # the sample is drawn from this multiple of its size
 WINDOWS = 8  # ranges of the likelihood, each with a shift of its own
-# Degrees around the likeliest turn of the scan, which is exact to less than six degrees; those near
-# it come first, and bound the others.
+# Degrees around the likeliest turn of the quick sums, which try one every 4.5 degrees. Those near it
+# come first, and bound the others.
 TURN_STEP = 3.0
-NEAR_TURNS = np.array([-1.5, 1.5, -4.5, 4.5, -7.5, 7.5])
+NEAR_TURNS = np.array([-1.5, 1.5, -4.5, 4.5])
 
 
 def score_associations(
@@ -376,7 +372,8 @@ def rerank(
     models, points = index.observer_offsets if off_centre else (index.models, np.zeros((1, 2)))
 
     def choose(cells: NDArray[np.int64], reached: float) -> _Ranks:
-        return prior[cells] + quick(cells, reached - MARGIN - prior[cells]), []
+        logliks, turns = quick(cells, reached - MARGIN - prior[cells])
+        return prior[cells] + logliks, turns
 
     def rank(cells: NDArray[np.int64], reached: float) -> _Ranks:
         return _score_cells(
@@ -395,6 +392,7 @@ def rerank(
     choice = choice[total[choice] > -np.inf]
     nearer = _rank_best(choose, choice, total[choice], first=FIRST_CHOSEN)
     choice, before = nearer.cells, nearer.after
+    scores = _with_turns(scores, nearer)
     ranked = _rank_best(rank, choice, before, first=FIRST_RERANKED, count=count)
     # The other cells change by as much as a sample of them.
     move = nearer.move + ranked.move
@@ -410,15 +408,7 @@ def rerank(
             changes = _changes(rank, cells, old, size=sample)
         loglik[cells] = old + changes - prior[cells]
     loglik[ranked.cells] = ranked.after - prior[ranked.cells]
-    headings: list[NDArray[np.float32] | None] = []
-    for heading, turn in zip(scores.headings, ranked.turns, strict=True):
-        if heading is None:
-            headings.append(None)
-            continue
-        exact = heading.copy()
-        exact[ranked.cells] = signed_degrees(turn)
-        headings.append(exact)
-    return CellScores(loglik=loglik, headings=tuple(headings))
+    return replace(_with_turns(scores, ranked), loglik=loglik)
 
 
 class _Ranked(NamedTuple):
@@ -433,6 +423,19 @@ class _Ranked(NamedTuple):
     after: NDArray[np.float64]
     turns: list[NDArray[np.float64]]
     move: float
+
+
+def _with_turns(scores: CellScores, ranked: _Ranked) -> CellScores:
+    """Return scores with the likeliest turns of some cells in place of those of the scan."""
+    headings: list[NDArray[np.float32] | None] = []
+    for heading, turn in zip(scores.headings, ranked.turns, strict=True):
+        if heading is None:
+            headings.append(None)
+            continue
+        exact = heading.copy()
+        exact[ranked.cells] = signed_degrees(turn)
+        headings.append(exact)
+    return replace(scores, headings=tuple(headings))
 
 
 def _rank_best(

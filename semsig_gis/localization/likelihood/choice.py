@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core import FULL_TURN, compiled, compiled_sums, share_rows
-from semsig_gis.localization.likelihood.index import BINS, own_sigma, photo_power, photo_rows
+from semsig_gis.localization.likelihood.index import own_sigma, photo_power, photo_rows
+from semsig_gis.localization.likelihood.records import BINS
 from semsig_gis.localization.likelihood.turns import turn_logs
 
 if TYPE_CHECKING:
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.records import BinnedObjects, LevelModel, PhotoRows
     from semsig_gis.observation import View
 
+    _TurnedScores = tuple[NDArray[np.float64], list[NDArray[np.float64]]]
+
 CELLS_A_THREAD = 128  # the fewest cells that are worth a thread
-NEAR_TURNS = np.array([-3.0, 0.0, 3.0])  # degrees around the likeliest turn of the scan
+NEAR_TURNS = np.array([-4.5, 0.0, 4.5])  # degrees around the likeliest turn of the scan
 _ROUNDS = 3  # of messages
 _LEAST_WEIGHT = np.float32(1e-3)  # of all pairs of an object, against a miss
 _LARGE = 1e200  # products beyond this, or below its inverse, become logarithms
@@ -34,12 +37,13 @@ _LARGE = 1e200  # products beyond this, or below its inverse, become logarithms
 
 def quick_scorer(
     index: LikelihoodIndex, view: View, scores: CellScores, *, north_sigma: float
-) -> Callable[[NDArray[np.int64], NDArray[np.float64]], NDArray[np.float64]]:
+) -> Callable[[NDArray[np.int64], NDArray[np.float64]], _TurnedScores]:
     """Return a function of cells: about the one-to-one log-likelihood of a view at their centres.
 
     It is that of the mean of the noise models. Photos of uncertain north are turned to about the
-    likeliest turns in the `scores` of the scan. The second argument of the function is a score by
-    cell: where the log-likelihood is surely lower, an upper bound of it is enough.
+    likeliest turns in the `scores` of the scan; the best turn of each photo is returned as well.
+    The second argument of the function is a score by cell: where the log-likelihood is surely
+    lower, an upper bound of it is enough.
     """
     photos = view.split()
     # The detections of an object are neighbours in memory.
@@ -49,9 +53,9 @@ def quick_scorer(
     power = photo_power(len(photos), index.noise)
     step = float(NEAR_TURNS[1] - NEAR_TURNS[0])
 
-    def score(cells: NDArray[np.int64], least: NDArray[np.float64]) -> NDArray[np.float64]:
+    def score(cells: NDArray[np.int64], least: NDArray[np.float64]) -> _TurnedScores:
         # A cell that does not fit one photo, or one turn, may fit the others.
-        total = np.zeros(len(cells))
+        total, best = np.zeros(len(cells)), []
         each = (
             least - math.log(len(NEAR_TURNS)) if len(photos) == 1 else np.full(len(cells), -np.inf)
         )
@@ -60,9 +64,10 @@ def quick_scorer(
             if heading is not None:
                 turns = heading[cells, None] + NEAR_TURNS
                 prior = turn_logs(turns, step, sigma)
-            logliks = _by_turn(index, row, cells, turns, each)
-            total += np.logaddexp.reduce(logliks + prior, axis=1)
-        return total * power
+            logliks = _by_turn(index, row, cells, turns, each) + prior
+            total += np.logaddexp.reduce(logliks, axis=1)
+            best.append(turns[np.arange(len(cells)), logliks.argmax(axis=1)])
+        return total * power, best
 
     return score
 

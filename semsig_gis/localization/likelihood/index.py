@@ -38,7 +38,13 @@ from semsig_gis.localization.likelihood.records import (
     PhotoRows,
     TurnedPhoto,
 )
-from semsig_gis.localization.likelihood.turns import TURNS, TurnPrior, TurnScores
+from semsig_gis.localization.likelihood.turns import (
+    TURNS,
+    WIDE_TURNS,
+    TurnPrior,
+    TurnScores,
+    wide_turn_chances,
+)
 from semsig_gis.localization.noise.beyond import noise_with_objects_beyond
 from semsig_gis.localization.noise.model import ROUNDING, cell_noise, place_noise
 from semsig_gis.localization.noise.table import database_tables, extent_sigma, mean_table
@@ -66,11 +72,13 @@ ERROR_RATIO = 1.3  # of errors that count as similar
 EXTENT_RATIO = 3.0  # of errors of extended things that do
 
 LENGTH_ODDS = 2.0  # ratio of odds up to which lengths of signatures share a row
-FIRST_DETECTIONS, FIRST_TURNED_DETECTIONS = LANES, 16
+FIRST_DETECTIONS, FIRST_TURNED_DETECTIONS = LANES, 12
 """Detections of a photo by which cells are chosen, if its north is known and if not."""
 
 VERSION = 6  # increased whenever the same database and noise give other likelihoods
 POINTS_A_SIDE = 3  # of the grid of points in a cell at which the best cells are compared
+MOST_CHANCE = np.float32(1.0 - 1e-6)  # of a detection: a miss is possible
+LEAST_WIDE_SIGMA = 20.0  # degrees of the deviation of north, for which wide turns are fine enough
 LEAST_DENSITY = 1e-12  # densities below count as 0: products of them would be slow to compute
 LAPS = np.arange(-3, 4)  # 180 degrees of deviation reach three turns
 
@@ -212,7 +220,8 @@ class LikelihoodIndex(Displayed):
                 photo = photo.select(np.linspace(0, len(photo) - 1, most).round().astype(np.int64))
             if sigma == 0.0:
                 return gain_scorer(photo, self.levels, share=share)(self.objects)
-            scorer = profile_scorer if is_plain(photo) else photo_scorer
+            wide = sigma >= LEAST_WIDE_SIGMA and is_plain(photo)
+            scorer = profile_scorer if wide else photo_scorer
             return scorer(photo, self.levels, sigma, share=share)(self.objects)
 
         return self.scores_by_photo(query, north_sigma, score_photo)
@@ -334,7 +343,8 @@ def gain_scorer(photo: View, levels: NoiseLevels, *, share: float = 1.0) -> _Sco
         for part in (model.remaining, model.leaving)
     )
     near = model.detected[..., None] * np.float32(share)
-    chances, away = near * remaining, near * leaving * np.float32(arrays.width)
+    chances = np.minimum(near * remaining, MOST_CHANCE)
+    away = near * leaving * np.float32(arrays.width)
     # Classes with the same chances share a row of the table.
     names = arrays.naming[lengths]
     logs = np.log(np.maximum(names, np.finfo(np.float32).tiny)).round(3)
@@ -343,14 +353,15 @@ def gain_scorer(photo: View, levels: NoiseLevels, *, share: float = 1.0) -> _Sco
         (group, numbers[:, kind].tobytes()) for kind, group in enumerate(model.group_of.tolist())
     ]
     distinct = list(dict.fromkeys(keys))
-    kinds, kind_of = [keys.index(key) for key in distinct], [distinct.index(key) for key in keys]
+    kinds = np.array([keys.index(key) for key in distinct])
+    kind_of = np.array([distinct.index(key) for key in keys], np.uint64)
     groups, some = model.group_of[kinds], np.ix_(lengths, kinds)
     gains = np.empty((len(lengths), len(kinds), COARSE_LEVELS, COARSE_BINS, LANES), np.uint8)
     scratch = np.empty(LANES, np.float32)
     inside = np.empty((len(levels.sigma), COARSE_LEVELS, COARSE_BINS), np.float32)
     gain_rows(
         arrays.rows[0],
-        arrays.masses if arrays.masses.size else arrays.masses[:0],
+        arrays.masses,
         groups,
         chances[some],
         names[:, kinds],
@@ -358,14 +369,13 @@ def gain_scorer(photo: View, levels: NoiseLevels, *, share: float = 1.0) -> _Sco
         gains,
         inside,
     )
-    in_sectors = arrays.masses.size > 0
     photo_gains = PhotoGains(
         gains=gains,
         length_of=length_of,
-        kind_of=np.array(kind_of, np.uint64),
+        kind_of=kind_of,
         missed=np.log(1.0 - chances) - away,
         inside=np.log(1.0 - chances[some][..., None] * inside[groups]) - away[some][..., None]
-        if in_sectors
+        if arrays.masses.size
         else np.empty((0, 0, 0, 0), np.float32),
         base=arrays.base,
     )
@@ -406,16 +416,16 @@ def profile_scorer(
     profile_of = np.zeros(len(table.codes), np.int64)
     profile_of[classes] = np.arange(1, len(classes) + 1)
     # An object at each step inside a turn, and the middles of the turns before and after it.
-    steps = BINS // TURNS
-    away = (np.arange(-TURNS, TURNS) + 0.5) * steps - (np.arange(steps)[:, None] + 0.5)
+    steps = BINS // WIDE_TURNS
+    away = (np.arange(-WIDE_TURNS, WIDE_TURNS) + 0.5) * steps - (np.arange(steps)[:, None] + 0.5)
     turned = TurnedPhoto(
         rows=levels.fine[:, :, np.rint(away * (FINE / BINS)).astype(np.int64) % FINE],
         own=(np.einsum("lkk->lk", names) - other).astype(np.float32),
         other=other.astype(np.float32),
         profile_of=profile_of,
         profiles=profiles.reshape(-1) + 1,
-        sectors=(detections.bearings * (TURNS / FULL_TURN)).astype(np.int64) % TURNS,
-        chances=TurnPrior.of(north_sigma).by_turn(),
+        sectors=(detections.bearings * (WIDE_TURNS / FULL_TURN)).astype(np.int64) % WIDE_TURNS,
+        chances=wide_turn_chances(north_sigma),
         base=float(np.log(density[rows]).sum() - density.sum() * FULL_TURN),
     )
     model = model._replace(detected=model.detected * np.float32(share))
@@ -424,8 +434,8 @@ def profile_scorer(
         size = len(objects.offsets) - 1
         scores, best = np.empty(size, np.float32), np.empty(size, np.int64)
         share_rows(lambda part: scan_profiles(part, objects, model, turned, scores, best), size)
-        turns = (best + TURNS // 2) % TURNS - TURNS // 2
-        return scores, (turns * (FULL_TURN / TURNS)).astype(np.float32)
+        turns = (best + WIDE_TURNS // 2) % WIDE_TURNS - WIDE_TURNS // 2
+        return scores, (turns * (FULL_TURN / WIDE_TURNS)).astype(np.float32)
 
     return score
 
@@ -602,9 +612,10 @@ class NoiseLevels:
         for length, row in enumerate(logs):
             if np.abs(row - logs[starts[-1]]).max() > math.log(LENGTH_ODDS):
                 starts.append(length)
-        ends = [*starts[1:], len(logs)]
-        groups = np.repeat(np.arange(len(starts)), np.subtract(ends, starts))
-        return groups.astype(np.uint64), (np.array(starts) + ends) // 2
+        firsts = np.array(starts)
+        ends = np.append(firsts[1:], len(logs))
+        groups = np.repeat(np.arange(len(firsts), dtype=np.uint64), ends - firsts)
+        return groups, (firsts + ends) // 2
 
     def rows(self, photo: PhotoTable) -> NDArray[np.float32]:
         """Return the density of each detection by group, level and bearing of an object."""

@@ -15,7 +15,7 @@ from semsig_gis.localization.likelihood.records import (
     DISTANCE_LEVELS,
     LANES,
 )
-from semsig_gis.localization.likelihood.turns import TURN_BLOCK
+from semsig_gis.localization.likelihood.turns import TURN_BLOCK, WIDE_TURNS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 # Unsigned constants, all powers of two: divisions by them are shifts.
 _ALL_BINS, _COARSE_BINS, _COARSE_LEVELS = map(np.uint64, (BINS, COARSE_BINS, COARSE_LEVELS))
 _BINS_A_BIN = np.uint64(BINS // COARSE_BINS)
+_BINS_A_TURN = np.uint64(BINS // WIDE_TURNS)
+_TURNS, _TWO_TURNS = np.uint64(WIDE_TURNS), np.uint64(2 * WIDE_TURNS)
 _BINS_A_LEVEL = np.uint64(BINS * DISTANCE_LEVELS // COARSE_LEVELS)
 _LARGE = 1e200  # products beyond this, or below its inverse, become logarithms
 _BINS = 1024  # bins of the histogram that finds the best scores
@@ -200,7 +202,7 @@ def scan(  # noqa: PLR0917 - a kernel takes no keywords
 
 
 @compiled
-def gain_rows(  # noqa: PLR0917 - a kernel takes no keywords
+def gain_rows(  # noqa: C901, PLR0917 - a kernel takes no keywords
     rows: NDArray[np.float32],
     masses: NDArray[np.float32],
     groups: NDArray[np.int64],
@@ -231,7 +233,7 @@ def gain_rows(  # noqa: PLR0917 - a kernel takes no keywords
                     for step in range(bin_ * many_bins, (bin_ + 1) * many_bins):
                         for lane in range(lanes):
                             sums[lane] += rows[group, fine, step, lane]
-                        mass += masses[group, fine, step] if len(masses) else one_f
+                        mass += masses[group, fine, step] if masses.size else one_f
                 mass *= share
                 means[group, level, bin_] = mass
                 for kind in range(kinds):
@@ -526,14 +528,14 @@ def scan_profiles(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no 
     leaving, group_of = model.leaving.ravel(), model.group_of.astype(np.uint64)
     own, other, rows = photo.own.ravel(), photo.other.ravel(), photo.rows.ravel()
     levels, steps = np.uint64(model.remaining.shape[1]), np.uint64(photo.rows.shape[2])
-    profile_of = photo.profile_of
-    step_bits = np.uint64(int(math.log2(photo.rows.shape[2]) + 0.5))
-    level_bits = step_bits + np.uint64(6)
-    turns, twice, one_f = np.uint64(64), np.uint64(128), np.float32(1.0)
-    bins = turns * steps - np.uint64(1)
-    profiles = np.empty((profile_of.max() + 1) * 128, np.float32)  # two turns each
-    floors = np.empty(profile_of.max() + 1, np.float32)
-    product = np.empty(64, np.float32)
+    # Not a constant, or loops are written out instead of vectorized.
+    turns = len(photo.chances)
+    profile_of, one_f = photo.profile_of.astype(np.uint64), np.float32(1.0)
+    # Profiles of objects, the first for other names; those of detections have two turns each.
+    profiles = np.empty((photo.profile_of.max() + 1) * WIDE_TURNS, np.float32)
+    doubled = np.empty(2 * len(profiles), np.float32)
+    floors = np.empty(photo.profile_of.max() + 1, np.float32)
+    product = np.empty(WIDE_TURNS, np.float32)
     for place in range(part[0], part[1]):
         low, high = np.uint64(offsets[place]), np.uint64(offsets[place + 1])
         length = min(high - low, longest) * classes
@@ -542,7 +544,7 @@ def scan_profiles(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no 
         total, unseen, all_leaving = photo.base, 1.0, np.float32(0.0)
         for entry in range(low, high):
             kind, bin_ = np.uint64(kinds[entry]), np.uint64(object_bins[entry])
-            level, bin_ = bin_ >> level_bits, bin_ & bins
+            level, bin_ = bin_ // _ALL_BINS, bin_ % _ALL_BINS
             near = detected[length + kind]
             chance = near * remaining[kind * levels + level]
             unseen *= one_f - chance
@@ -551,51 +553,52 @@ def scan_profiles(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no 
                 unseen = 1.0
             odds = chance / (one_f - chance)
             # The density at each turn from the bearing of the object on.
-            row = (group_of[kind] * levels + level) * steps + (bin_ & (steps - np.uint64(1)))
-            row = row * twice + turns - (bin_ >> step_bits)
+            row = (group_of[kind] * levels + level) * steps + bin_ % _BINS_A_TURN
+            row = row * _TWO_TURNS + _TURNS - bin_ // _BINS_A_TURN
             weight = odds * other[length + kind]
-            for turn in range(64):
+            for turn in range(turns):
                 profiles[turn] += weight * rows[row + np.uint64(turn)]
-            profile = np.uint64(profile_of[kind])
-            if profile > 0:
-                weight = odds * own[length + kind]
-                for turn in range(64):
-                    profiles[profile * twice + np.uint64(turn)] += (
-                        weight * rows[row + np.uint64(turn)]
-                    )
             # Objects that came into range as others left it, in any direction.
             away = near * leaving[kind * levels + level]
             all_leaving += away
             away /= np.float32(FULL_TURN)
             floors[0] += away * other[length + kind]
+            profile = profile_of[kind]
             if profile > 0:
+                weight = odds * own[length + kind]
+                first = profile * _TURNS
+                for turn in range(turns):
+                    profiles[first + np.uint64(turn)] += weight * rows[row + np.uint64(turn)]
                 floors[profile] += away * own[length + kind]
         total += math.log(unseen) - float(all_leaving)
-        for number in range(len(floors)):
-            for turn in range(64):
-                profiles[number * 128 + 64 + turn] = profiles[number * 128 + turn]
+        for profile in range(np.uint64(1), np.uint64(len(floors))):
+            floor, first = one_f + floors[profile] + floors[0], profile * _TURNS
+            for turn in range(turns):
+                at = first + first + np.uint64(turn)
+                doubled[at] = floor + profiles[first + np.uint64(turn)] + profiles[turn]
+            for turn in range(turns):
+                at = first + first + np.uint64(turn)
+                doubled[at + _TURNS] = doubled[at]
         product[:] = photo.chances
         for detection in range(len(photo.sectors)):
-            sector = np.uint64(photo.sectors[detection])
-            profile = np.uint64(photo.profiles[detection])
-            floor = one_f + floors[profile] + floors[0]
-            first = profile * twice + sector
-            for turn in range(64):
-                product[turn] *= (
-                    floor + profiles[first + np.uint64(turn)] + profiles[sector + np.uint64(turn)]
-                )
+            first = np.uint64(photo.profiles[detection]) * _TWO_TURNS
+            first += np.uint64(photo.sectors[detection])
+            for turn in range(turns):
+                product[turn] *= doubled[first + np.uint64(turn)]
             if (detection + 1) % 4 == 0:  # four sums are below 1e38
-                most = np.float32(0.0)
-                for turn in range(64):
-                    most = max(most, product[turn])
-                total += math.log(most)
-                for turn in range(64):
-                    product[turn] /= most
-        likeliest, mass = 0, np.float32(0.0)
-        for turn in range(64):
+                mass = np.float32(0.0)
+                for turn in range(turns):
+                    mass += product[turn]
+                total += math.log(mass)
+                share = one_f / mass
+                for turn in range(turns):
+                    product[turn] *= share
+        likeliest, mass, most = 0, np.float32(0.0), np.float32(0.0)
+        for turn in range(turns):
             mass += product[turn]
-            if product[turn] > product[likeliest]:
-                likeliest = turn
+            most = max(most, product[turn])
+        while product[likeliest] < most:
+            likeliest += 1
         best[place] = likeliest
         scores[place] = total + math.log(mass)
 

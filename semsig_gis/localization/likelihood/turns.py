@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 TURNS = 64
 """Turns of a photo of uncertain north: steps of 5.625 degrees."""
+WIDE_TURNS = 32
+"""Turns of a photo of uncertain north by which cells are chosen: steps of 11.25 degrees."""
 TURN_BLOCK = 16
 """Turns that `kernels.scan_turned` adds up together."""
 _LEAST_TURN_CHANCE = 1e-7  # of a turn, relative to the likeliest; others are left out
@@ -37,13 +39,6 @@ class TurnPrior(NamedTuple):
         chances = chances[likely] / chances[likely].sum()
         return cls(int(turns[likely[0]]), np.pad(chances, (0, -len(chances) % TURN_BLOCK)))
 
-    def by_turn(self) -> NDArray[np.float32]:
-        """Return the chances of all turns from 0 on."""
-        chances = np.zeros(TURNS, np.float32)
-        turns = (self.first + np.arange(len(self.chances))) % TURNS
-        np.add.at(chances, turns, self.chances)
-        return chances
-
 
 class TurnScores(NamedTuple):
     """The likelihood of a photo in n cells by turn: e to the power of `logs`, times `shares`."""
@@ -56,6 +51,13 @@ class TurnScores(NamedTuple):
         """Return room for the likelihood of a photo by turn."""
         turns = len(TurnPrior.of(north_sigma).chances)
         return cls(np.empty(cells, np.float32), np.empty((cells, turns), np.float32))
+
+
+def wide_turn_chances(north_sigma: float) -> NDArray[np.float32]:
+    """Return the chances of all `WIDE_TURNS`, for a deviation of north in degrees."""
+    turns = signed_degrees(np.arange(WIDE_TURNS) * (FULL_TURN / WIDE_TURNS))
+    chances = np.exp(-0.5 * (turns / north_sigma) ** 2)
+    return np.asarray(chances / chances.sum(), np.float32)
 
 
 def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
