@@ -28,11 +28,11 @@ ARRAYS = {
     "bearing_units": "a9b2bfe3b880342f",
     "distance_units": "7295c182ed87b580",
 }
-# Of three distorted views: the best cells, the chance of the best place, and its logarithm.
+# Of three distorted views: the best cell, the chance of its place, and its logarithm.
 ANSWERS = (
-    ([282, 2973, 3036], 0.9999999913031753, -88.10043829393773),
-    ([85, 533, 552], 0.13780853021886724, -62.19977665001247),
-    ([2045, 1296, 48], 0.893091541066482, -62.934105467481764),
+    (282, 0.9999999913031753, -88.10043829393773),
+    (85, 0.13780853021886724, -62.19977665001247),
+    (2045, 0.893091541066482, -62.934105467481764),
 )
 
 
@@ -53,9 +53,10 @@ def test_the_database_of_the_papers_classes_has_not_changed(helsinki: City) -> N
 def test_answers_with_the_papers_classes_have_not_changed(helsinki: City) -> None:
     spec = QuerySpec(number=len(ANSWERS), seen_from="anywhere")
     queries = draw_queries(helsinki.database, spec, store=helsinki.store)
-    for query, (cells, chance, loglik) in zip(queries, ANSWERS, strict=True):
+    for query, (cell, chance, loglik) in zip(queries, ANSWERS, strict=True):
         answer = localize(helsinki, query.asked.signature)
-        assert answer.columns["cell"][:3].tolist() == cells
+        assert answer.columns["cell"][0] == cell
+        # The likelihood of most other cells is estimated from a sample.
+        assert answer.chance == pytest.approx(chance, abs=0.01)
         # Processors differ in the last digits of logarithms.
-        assert answer.chance == pytest.approx(chance, rel=1e-9)
         assert answer.loglik.max() == pytest.approx(loglik, rel=1e-9)

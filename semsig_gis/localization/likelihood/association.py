@@ -311,7 +311,7 @@ MARGIN = 20.0  # nats below the best cell at which an upper bound of a score is 
 NEGLIGIBLE = 30.0  # nats below the best re-ranked cell at which all cells together are negligible
 POOL = 16  # the sample is drawn from this multiple of its size
 WINDOWS = 8  # ranges of the likelihood, each with a shift of its own
-# Degrees around the likeliest turn of the quick sums, which try one every 4.5 degrees. Those near it
+# Degrees around the likeliest turn of the quick sums, which try one in 4.5 degrees. Those near it
 # come first, and bound the others.
 TURN_STEP = 3.0
 NEAR_TURNS = np.array([-1.5, 1.5, -4.5, 4.5])
