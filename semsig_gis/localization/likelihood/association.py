@@ -402,11 +402,10 @@ def rerank(
     live = total > min(ranked.after.max(), total.max()) - NEGLIGIBLE
     live[choice] = False
     rest = np.flatnonzero(live)
+    loglik[choice[left]] = before[left] + ranked.move - prior[choice[left]]
     for cells, old, usual in ((choice[left], before[left], ranked.move), (rest, total[rest], move)):
-        changes: NDArray[np.float64] | float = usual
         if len(cells) and log_sum(old) + usual > reached + LOG_LEAST_SHARE:
-            changes = _changes(rank, cells, old, size=sample)
-        loglik[cells] = old + changes - prior[cells]
+            loglik[cells] = old + _changes(rank, cells, old, size=sample) - prior[cells]
     loglik[ranked.cells] = ranked.after - prior[ranked.cells]
     return replace(_with_turns(scores, ranked), loglik=loglik)
 
