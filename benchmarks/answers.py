@@ -1,10 +1,14 @@
-"""Time of complete answers in a city like Paris: warm, in a batch, and from a new process."""
+"""Time of complete answers in a city like Paris, and of predicting how good they will be.
+
+Answers are warm, in a batch, and from a new process.
+"""
 
 from __future__ import annotations
 
 import functools
 import json
 import math
+import os
 import statistics
 import subprocess
 import sys
@@ -20,6 +24,8 @@ from rapidfuzz.process import cdist
 from benchmarks._cities import made_up, made_up_streets
 from benchmarks.comparison import Comparison, compare
 from semsig_gis.database import ObjectStore, save_database
+from semsig_gis.evaluation import identify
+from semsig_gis.evaluation.identifiability.analysis import CLASS_TRIALS, TRIALS
 from semsig_gis.localization import build_index, cell_noise, locate, named_noise
 from semsig_gis.sources import PARIS_LIKE, CitySpec
 
@@ -41,6 +47,9 @@ _NORTH_UNKNOWN, _BATCH = 1 / 3, 1 / 4
 _COLD_MS, _MEMORY_MB = 700.0, 300.0
 _LOADING = 1 / 0.7
 _MOST_HELP_MS = 500.0
+_MOST_IDENTIFY_MS = 60_000.0
+# The number of trials to predict how well queries are located, and of those without each class.
+_TRIALS = {"full": (TRIALS, CLASS_TRIALS), "small": (30, 5)}
 _EXPLAINED = 3
 _IMPORTS = "import numba, pandas, geopandas, pyarrow, typer, rich"
 _DISTANCE = ("--method", "edit+edit")
@@ -73,6 +82,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
     picked = np.random.default_rng(_SEED).integers(0, len(database), batch).tolist()
     queries = [database.signature(cell) for cell in picked]
     yield from _warm_rows(database, ObjectStore.of(objects), queries[:repeats])
+    yield _identify_row(database, queries[:repeats], *_TRIALS[size])
     with tempfile.TemporaryDirectory() as folder:
         city = Path(folder) / "city.parquet"
         save_database(database, city)
@@ -132,6 +142,24 @@ def _warm_rows(
         repeats=len(queries),
         bar=_NORTH_UNKNOWN,
     )
+
+
+def _identify_row(
+    database: SignatureDatabase, queries: Sequence[Signature], trials: int, class_trials: int
+) -> Comparison:
+    """Measure the prediction of how well a query from each cell is located."""
+    noise = cell_noise(named_noise("generic"), database.grid.step)  # as the command does
+    index = build_index(database, noise)
+    return compare(
+        f"identifying the cells, {len(database):,} cells",
+        lambda _: identify(
+            index, trials=trials, class_trials=class_trials, threads=os.cpu_count() or 1
+        ),
+        lambda _: [locate(index, query) for query in queries],
+        peer_name=f"{len(queries)} answers by likelihood",
+        repeats=1,
+        warm_up=False,
+    ).at_most(_MOST_IDENTIFY_MS)
 
 
 def _batch_row(

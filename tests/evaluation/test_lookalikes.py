@@ -25,6 +25,7 @@ from semsig_gis.evaluation import (
     try_without_classes,
 )
 from semsig_gis.evaluation.identifiability import lookalikes
+from semsig_gis.evaluation.identifiability import trials as trial_module
 from semsig_gis.localization import (
     CellScores,
     NoiseMixture,
@@ -32,11 +33,12 @@ from semsig_gis.localization import (
     build_index,
     named_noise,
     posterior,
-    rerank,
+    score_associations,
 )
 from semsig_gis.observation import Photo, View
 
 if TYPE_CHECKING:
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import SymbolColumns
     from semsig_gis.localization import Noise
 
@@ -190,7 +192,12 @@ def test_signature_with_more_objects_than_fit_into_16_bits() -> None:
 
 @pytest.mark.parametrize("noise", ["light", "generic"])
 @pytest.mark.parametrize("radius", [0.0, 30.0])
-def test_outcomes_of_trials_agree_with_the_whole_method(noise: str, radius: float) -> None:
+def test_outcomes_of_trials_agree_with_the_whole_method(
+    noise: str, radius: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Every cell is re-ranked.
+    monkeypatch.setattr(trial_module, "LEAST_SHARE", 0.0)
+    monkeypatch.setattr(trial_module, "RERANKED", 500)
     database = random_database(8, cells=120, longest=6)
     index = build_index(database, named_noise(noise))
     cells = trial_cells(len(database), 60, seed=2)
@@ -201,10 +208,11 @@ def test_outcomes_of_trials_agree_with_the_whole_method(noise: str, radius: floa
             assert trials.near[row] == 0
             continue
         cell = int(cells[row])
-        first = CellScores(loglik=columns.scores(query, 0))
+        first = CellScores(loglik=columns.scores(query, 0, bases=columns.bases()))
         errors = first.loglik - index.scores(query).loglik
         assert np.abs(errors).mean() < 0.2 * len(query)  # bearings are in steps of five degrees
-        answer = posterior(database, rerank(index, query, first).loglik)
+        exact = score_associations(database, query, index.noise, np.arange(len(database)))
+        answer = posterior(database, exact)
         away = np.hypot(*(database.xy - database.xy[cell]).T)
         assert math.isclose(trials.itself[row], answer.chances[cell], abs_tol=1e-6)
         assert math.isclose(trials.near[row], answer.chances[away <= radius].sum(), abs_tol=1e-6)
@@ -214,6 +222,97 @@ def test_outcomes_of_trials_agree_with_the_whole_method(noise: str, radius: floa
         own = columns.loglik(cell, 0, np.arange(120))
         lean = answer.chances @ (own - own[cell])
         assert math.isclose(trials.lean[row], lean, abs_tol=1e-3)
+
+
+def large_city(seed: int, cells: int, *, longest: int = 12) -> SignatureDatabase:
+    """Return a city of many cells, in which 400 signatures are repeated."""
+    database = random_database(seed, cells=400, longest=longest)
+    columns, rows = np.divmod(np.arange(cells, dtype=np.int32), 50)
+    repeated = database.select(np.arange(cells) % 400)
+    return dataclasses.replace(repeated, columns=columns, rows=rows)
+
+
+@pytest.mark.parametrize("noise", ["light", "generic"])
+def test_sampled_cells_of_trials_represent_the_others(
+    noise: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    database = large_city(8, 2000, longest=6)
+    index = build_index(database, named_noise(noise))
+    cells = trial_cells(len(database), 150, seed=2)
+    columns = symbol_columns(index)
+    whole = try_cells(index, cells, columns=columns, seed=3)
+    monkeypatch.setattr(trial_module, "LIKELIEST", 500)
+    part = try_cells(index, cells, columns=columns, seed=3)
+    for name in ("itself", "near", "found"):
+        errors = 1.0 * getattr(part, name) - getattr(whole, name)
+        # A view that fits many cells is found in fewer or more places by chance.
+        assert abs(errors.mean()) < (0.1 if name == "found" else 2e-3)
+        assert np.sqrt((errors**2).mean()) < (0.3 if name == "found" else 1e-2)
+    assert abs((part.bits - whole.bits).mean()) < 0.3
+    assert np.abs(part.bits - whole.bits).max() < 1.0
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 50), st.sampled_from([1, 40, 300]), st.sampled_from([0.0, 3.0, math.inf]))
+def test_scores_agree_with_a_plain_loop(seed: int, cells: int, margin: float) -> None:
+    database = random_database(seed, cells=cells, classes=3)
+    columns = symbol_columns(build_index(database, named_noise("medium")))
+    query = database.signature(seed % cells)
+    flat, rows = bytes_of(columns), columns.table.query_rows(query)
+    symbols = rows * 72 + np.floor(parts_of(query)[1] / 5.0).astype(np.int64) % 72
+    sums = columns.step * flat[symbols].sum(axis=0, dtype=np.int64)
+    sums += np.log(columns.table.density[rows]).sum()
+    for omitted in (None, 0):
+        expected = columns.constants[0] + sums
+        if omitted is not None:
+            others = columns.counts[0].sum(axis=0) > columns.counts[0, omitted]
+            expected = np.where(others, expected - columns.missed[0, omitted], -np.inf)
+        bases = columns.bases(omitted)
+        scores = columns.scores(query, 0, bases=bases, margin=margin)
+        kept = np.isfinite(scores)
+        assert np.allclose(scores[kept], expected[kept], atol=1e-3)
+        assert (kept | ~(expected > expected.max() - margin + 1e-3)).all()
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 100), st.integers(1, 400), st.floats(0.5, 3.0))
+def test_shifts_interpolate_the_changes_of_a_sample(seed: int, count: int, slope: float) -> None:
+    rng = np.random.default_rng(seed)
+    scores = rng.normal(0.0, 5.0, count)
+    sample = trial_module._sample(scores)
+    assert len(np.unique(sample)) == len(sample) <= trial_module.RERANKED_SAMPLE
+    assert (np.diff(scores[sample]) <= 0).all()
+    before = scores[sample]
+    # The same change everywhere is found again; a change by score lies between its extremes.
+    assert np.allclose(trial_module._shifts(scores, before, before - slope), -slope)
+    moved = trial_module._shifts(scores, before, before * (1.0 + slope))
+    assert moved.min() >= slope * before.min() - 1e-9
+    assert moved.max() <= slope * before.max() + 1e-9
+
+
+def test_similar_cells_are_neighbours() -> None:
+    order = COLUMNS.order
+    assert sorted(order.tolist()) == list(range(300))
+    assert (COLUMNS.slots[order] == np.arange(300)).all()
+    sees = (COLUMNS.counts[0][:, order] > 0).T
+    changes = (sees[1:] != sees[:-1]).any(axis=1).sum()
+    assert changes == len(np.unique(sees, axis=0)) - 1
+
+
+def test_blocks_without_likely_cells_do_not_change_the_result(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Several blocks, of which some are skipped: the likely cells and their places are the same.
+    columns = symbol_columns(build_index(large_city(9, 5000), named_noise("medium")))
+    monkeypatch.setattr(lookalikes, "LIKELY_CELLS", 40)
+    some = np.arange(0, 5000, 250)
+    result = find_lookalikes(columns, temperature=0.5, radius=20.0, looks=some)
+    for row, cell in enumerate(some.tolist()):
+        powers, away = ratios(columns, cell, 0.5), distances_from(columns, cell)
+        beyond = powers * (away > 20.0)
+        assert math.isclose(result.near[row], powers[away <= 20.0].sum(), rel_tol=2e-3)
+        assert math.isclose(powers[result.cells[row]].max(), beyond.max(), rel_tol=1e-4)
+        assert abs(np.log(result.far[row] / beyond.sum())) < 0.5
 
 
 def test_query_without_detections_is_not_answered() -> None:

@@ -42,6 +42,7 @@ PARTS = {
     "one likelihood query": False,
     "likelihood queries": False,
     "the whole answer by likelihood": True,
+    "identifying the cells": True,
     "a process that answers": True,
     "cold: semsig localize by likelihood": True,
     "peak memory of semsig localize": True,

@@ -16,7 +16,6 @@ import numpy as np
 
 from semsig_gis.core import MOST_METRES, InputError, cell_ids, require_number
 from semsig_gis.evaluation.identifiability.kernels import (
-    BLOCK_CELLS,
     BaseScores,
     CellColumns,
     CellPlaces,
@@ -25,6 +24,7 @@ from semsig_gis.evaluation.identifiability.kernels import (
     Entries,
     compare_cells,
 )
+from semsig_gis.evaluation.identifiability.symbol_tables import paired
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.identifiability.symbol_tables import SymbolColumns
 
-CELLS_A_TASK = 1024
+CELLS_A_TASK = 2048
 LEAST_SUM = 1e-30  # of ratios, so that it has a logarithm
 LIKELY_CELLS = 300  # approximate number of cells compared one by one with each cell
 SAMPLE_CELLS = 4096  # sample of all other cells
@@ -109,7 +109,10 @@ def find_lookalikes(
     radius = min(radius, city_extent(database))
     cell_columns = CellColumns(
         values=columns.values,
-        constants=columns.constants,
+        order=columns.order,
+        slots=columns.slots,
+        peaks=columns.peaks,
+        constants=np.ascontiguousarray(columns.constants[:, columns.order]),
         step=columns.step,
         powers=_powers(columns, temperature),
     )
@@ -121,7 +124,7 @@ def find_lookalikes(
     samples = {is_wide: _sample(columns, bases[is_wide], seed) for is_wide in widths}
     places_of_cells = CellPlaces(
         ids=database.cell_ids,
-        at=np.stack([database.columns, database.rows], axis=1).astype(np.int64),
+        at=np.stack([database.columns, database.rows], axis=1)[columns.order].astype(np.int64),
         circle=cell_circle(radius, database.grid.step),
         limit=math.floor((radius / database.grid.step + 1e-9) ** 2),
     )
@@ -141,16 +144,14 @@ def find_lookalikes(
 
     def compare(part: slice) -> None:
         is_wide = bool(wide[viewpoints[part]].any())
-        sample = samples[is_wide]
         compare_cells(
             rows[part],
             entries,
             columns.inside,
             cell_columns,
             bases[is_wide],
-            sample,
+            samples[is_wide],
             places_of_cells,
-            np.empty((2, max(BLOCK_CELLS, len(sample.cells))), np.uint32 if is_wide else np.uint16),
             Comparisons(
                 near=lookalikes.near[part],
                 far=lookalikes.far[part],
@@ -174,15 +175,20 @@ def find_lookalikes(
 
 def _bases(columns: SymbolColumns, temperature: float, *, wide: bool) -> BaseScores:
     """Return the scores of all cells before the columns of a query are added."""
-    constants = columns.constants.astype(np.float64) - columns.constants.max()
+    constants = columns.constants[:, columns.order].astype(np.float64) - columns.constants.max()
     lowest = 1.0 - np.rint(constants.min() / columns.step) if wide else BASE_LEVELS
     levels = np.maximum(np.rint(constants / columns.step) + lowest, 1.0)
     trims = np.exp(temperature * (constants - columns.step * (levels - lowest)))
-    lifts = -temperature * columns.missed.transpose(0, 2, 1).astype(np.float64)
-    # Blocks are whole: the last one has cells without a place, with level 0.
-    padding = columns.values.shape[0] * columns.values.shape[2] - len(columns.database)
+    missed = columns.missed[:, :, columns.order].transpose(0, 2, 1)
+    lifts = -temperature * missed.astype(np.float64)
+    # Blocks are whole: the last one has slots without a cell, with level 0.
+    blocks, _, size = columns.values.shape
+    padding = blocks * size - len(columns.database)
+    levels = np.pad(levels, [(0, 0), (0, padding)]).astype(np.uint32 if wide else np.uint16)
+    peaks = levels.reshape(len(levels), blocks, size).max(axis=2)
     return BaseScores(
-        levels=np.pad(levels, [(0, 0), (0, padding)]).astype(np.uint32 if wide else np.uint16),
+        levels=levels,
+        peaks=np.pad(peaks, [(0, 0), (0, blocks % 2)]),
         trims=np.maximum(trims, LEAST_SUM).astype(np.float32),
         lifts=np.exp(np.minimum(lifts, MOST_OCTAVES * math.log(2.0))).astype(np.float32),
     )
@@ -201,17 +207,17 @@ def _sample(columns: SymbolColumns, bases: BaseScores, seed: int) -> CellSample:
     count = len(columns.database)
     size = SAMPLE_CELLS if count > SAMPLE_CELLS else 0
     cells = np.sort(np.random.default_rng([seed, 1]).permutation(count)[:size])
-    # As in a block: cells of the first and of the second half take turns.
-    interleaved = np.stack([cells[: size // 2], cells[size // 2 :]], axis=1).ravel()
-    lifts = np.ascontiguousarray(bases.lifts[:, cells].transpose(0, 2, 1))
+    slots = columns.slots[cells]
+    lifts = np.ascontiguousarray(bases.lifts[:, slots].transpose(0, 2, 1))
     kind, seeing = np.nonzero((lifts != 1.0).any(axis=0))
     return CellSample(
         cells=cells,
         ids=columns.database.cell_ids[cells],
-        pairs=np.ascontiguousarray(columns.of(interleaved)).view(np.uint16),
+        pairs=paired(columns.of(cells)),
         bases=BaseScores(
-            levels=np.ascontiguousarray(bases.levels[:, cells]),
-            trims=np.ascontiguousarray(bases.trims[:, cells]),
+            levels=np.ascontiguousarray(bases.levels[:, slots]),
+            peaks=bases.peaks[:, :0],
+            trims=np.ascontiguousarray(bases.trims[:, slots]),
             lifts=lifts,
         ),
         starts=np.searchsorted(kind, np.arange(lifts.shape[1] + 1)),

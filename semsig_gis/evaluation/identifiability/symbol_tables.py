@@ -23,6 +23,7 @@ from semsig_gis.evaluation.identifiability.kernels import (
     LINE_CELLS,
     MANTISSA_BITS,
     DetectedObjects,
+    SlotBases,
     fill_columns,
     score_cells,
 )
@@ -44,6 +45,7 @@ BIN_UNITS = BEARING_UNITS // BINS
 
 NOISE_LEVELS = 128  # of bearing noise, if it depends on the distance
 LINES_A_TASK = 64
+CELLS_A_GROUP = 4096  # cells with similar scores for a query without detections
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,14 +54,17 @@ class SymbolColumns:
 
     `values`, shape (blocks, k * 72, cells of a block), are in units of `step`. The symbols of a
     class of the `table` are adjacent; cells of the first and of the second half of a block take
-    turns. The d `looks` are photos in several directions or one full turn. By look, `constants`
-    (d, n) is the score of each cell for a query without detections, `missed` (d, k, n) the part of
-    it from the undetected objects of each class, and `counts` (d, k, n) their number.
+    turns. `order` (n,) is the cell in each slot of the blocks: similar cells are neighbours, so
+    that the highest values of a block are not much higher than those of its cells. The d `looks`
+    are photos in several directions or one full turn. By look, `constants` (d, n) is the score of
+    each cell for a query without detections, `missed` (d, k, n) the part of it from the undetected
+    objects of each class, and `counts` (d, k, n) their number.
     """
 
     database: SignatureDatabase
     table: NoiseTable
     values: NDArray[np.uint8]
+    order: NDArray[np.int64]
     step: float
     constants: NDArray[np.float32]
     looks: tuple[Photo, ...]
@@ -72,6 +77,13 @@ class SymbolColumns:
         return self.table.row_of[self.database.codes]
 
     @cached_property
+    def slots(self) -> NDArray[np.int64]:
+        """Slot of every cell in the blocks."""
+        slots = np.empty_like(self.order)
+        slots[self.order] = np.arange(len(slots))
+        return slots
+
+    @cached_property
     def symbols(self) -> NDArray[np.int64]:
         """Symbol of every object in every cell: its row in `values`."""
         return self.kinds * BINS + self.database.bearing_units // BIN_UNITS
@@ -82,23 +94,42 @@ class SymbolColumns:
         middles = (np.arange(BEARING_UNITS) + 0.5) * (FULL_TURN / BEARING_UNITS)
         return np.stack([look.sees(middles) for look in self.looks])
 
+    @cached_property
+    def peaks(self) -> NDArray[np.uint16]:
+        """Highest value of each symbol in each block, as in `CellColumns`."""
+        return paired(self.values.max(axis=2).T)
+
+    def bases(self, omitted_class: int | None = None) -> SlotBases:
+        """Return the scores of all cells for a query without detections, for `scores`.
+
+        With an `omitted_class` (its row), cells have no objects of it; cells that see no other
+        class are impossible.
+        """
+        scores = self.constants
+        if omitted_class is not None:
+            others = self.counts.sum(axis=1) > self.counts[:, omitted_class]
+            scores = np.where(others, scores - self.missed[:, omitted_class], -np.inf)
+        padding = self.values.shape[0] * self.values.shape[2] - len(self.order)
+        scores = np.pad(scores[:, self.order], [(0, 0), (0, padding)], constant_values=-np.inf)
+        peaks = scores.reshape(len(scores), len(self.values), -1).max(axis=2)
+        return SlotBases(scores.astype(np.float32), peaks.astype(np.float32))
+
     def scores(
-        self, query: Signature, look: int, *, omitted_class: int | None = None
+        self, query: Signature, look: int, *, bases: SlotBases, margin: float = math.inf
     ) -> NDArray[np.float32]:
         """Return the approximate log-likelihood of a query of a look in every cell.
 
-        With an `omitted_class` (its row), cells have no objects of it; misclassified objects
-        are neglected. The query has bearings and known types.
+        Misclassified objects of an omitted class are neglected. Cells that are more than `margin`
+        below the best cell may get minus infinity. The query has bearings and known types.
         """
         rows = self.table.query_rows(query)
-        base = np.log(self.table.density[rows]).sum()
-        constants = self.constants[look] + np.float32(base)
-        if omitted_class is not None:
-            constants -= self.missed[look, omitted_class]
-        scores = np.empty(len(constants), np.float32)
+        scores = np.empty(len(self.order), np.float32)
         bins = np.floor(query_bearings(query) / BIN_DEGREES).astype(np.int64) % BINS
-        score_cells(rows * BINS + bins, self.values, constants, self.step, scores)
-        return scores
+        symbols = rows * BINS + bins
+        score_cells(
+            symbols, look, self.values, self.peaks, self.order, bases, self.step, margin, scores
+        )
+        return scores + np.float32(np.log(self.table.density[rows]).sum())
 
     def loglik(self, cell: int, look: int, cells: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the log-likelihood, up to a constant, of a look from a cell in some `cells`."""
@@ -116,7 +147,7 @@ class SymbolColumns:
     def _positions(self, cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the block of each cell and its place in the block."""
         half = self.values.shape[2] // 2
-        block, inside = np.divmod(cells, 2 * half)
+        block, inside = np.divmod(self.slots[cells], 2 * half)
         return block, 2 * (inside % half) + inside // half
 
 
@@ -146,6 +177,8 @@ def symbol_columns(
         inside = _masses(spread, look)[spread_of, units, bins] if look.sectors else 1.0
         missed[number] = by_class(np.log1p(-chances * inside) - leaving * (look.width / FULL_TURN))
         counts[number] = by_class(look.sees(database.bearings))
+    constants = missed.sum(axis=1, dtype=np.float64)
+    order = _similar_cells(constants.mean(axis=0), counts.sum(axis=0))
     clutter = table.clutter.sum() * np.array([look.width / FULL_TURN for look in looks])
     values = np.zeros((-(-cells // BLOCK_CELLS), classes, BINS, BLOCK_CELLS), np.uint8)
     step = _write_columns(
@@ -154,6 +187,7 @@ def symbol_columns(
         (spread_of, spread),
         chances / (1.0 - chances),
         leaving / FULL_TURN,
+        order,
         values,
         threads,
     )
@@ -161,12 +195,33 @@ def symbol_columns(
         database=database,
         table=table,
         values=values.reshape(len(values), -1, BLOCK_CELLS),
+        order=order,
         step=step,
         looks=looks,
-        constants=(missed.sum(axis=1, dtype=np.float64) - clutter[:, None]).astype(np.float32),
+        constants=(constants - clutter[:, None]).astype(np.float32),
         missed=missed,
         counts=counts,
     )
+
+
+def paired(values: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """Return pairs of the first and the second half of each row, with a 0 more if it is odd."""
+    count = values.shape[1]
+    halves = np.pad(values, [(0, 0), (0, count % 2)]).reshape(len(values), 2, -1)
+    return np.ascontiguousarray(halves.transpose(0, 2, 1)).reshape(len(values), -1).view(np.uint16)
+
+
+def _similar_cells(constants: NDArray[np.float64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the order of the cells: first by score for a query without detections, in groups.
+
+    Cells of a group are ordered by the classes that they see, the commonest in half of the cells
+    first. `counts`, shape (k, n), are the numbers of objects of each class.
+    """
+    group = np.empty(len(constants), np.int64)
+    group[np.argsort(constants, kind="stable")] = np.arange(len(constants)) // CELLS_A_GROUP
+    sees = counts > 0
+    dividing = np.argsort(np.abs(sees.mean(axis=1) - 0.5), kind="stable")
+    return np.lexsort([*sees[dividing[::-1]], group])
 
 
 def _masses(spread: NDArray[np.float32], look: Photo) -> NDArray[np.float32]:
@@ -184,6 +239,7 @@ def _write_columns(  # noqa: PLR0917 - a private helper of one caller
     spreads: tuple[NDArray[np.uint8], NDArray[np.float32]],
     odds: NDArray[np.float64],
     leaving: NDArray[np.float64],
+    order: NDArray[np.int64],
     columns: NDArray[np.uint8],
     threads: int,
 ) -> float:
@@ -214,7 +270,10 @@ def _write_columns(  # noqa: PLR0917 - a private helper of one caller
     ]
     with ThreadPoolExecutor(threads) as pool:
         list(
-            pool.map(lambda part: fill_columns(part, objects, spread, naming, logs, columns), parts)
+            pool.map(
+                lambda part: fill_columns(part, order, objects, spread, naming, logs, columns),
+                parts,
+            )
         )
     return step
 

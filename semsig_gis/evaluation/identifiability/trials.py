@@ -6,17 +6,26 @@ import math
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import repeat
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core import each_in_order
+from semsig_gis.core import each_in_order, log_sum
+from semsig_gis.database import visible_objects_in
 from semsig_gis.evaluation.identifiability.lookalikes import city_extent
 from semsig_gis.evaluation.identifiability.symbol_tables import symbol_columns
 from semsig_gis.evaluation.queries.distortion_text import prepare_chain
 from semsig_gis.evaluation.queries.distortions import SimulatedDetector
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
-from semsig_gis.localization import CellScores, build_index, posterior, rerank
+from semsig_gis.localization import (
+    CellScores,
+    PhotoTable,
+    build_index,
+    photo_loglik,
+    posterior,
+    promising_cells,
+    quick_scorer,
+)
 from semsig_gis.observation import FULL_VIEW, View
 
 if TYPE_CHECKING:
@@ -32,9 +41,17 @@ if TYPE_CHECKING:
 
 
 LEANS = 300  # trials to fit the temperature of the likelihoods of signatures
-# Re-ranked cells of a trial: the likeliest, and a sample of the others.
-RERANKED, RERANKED_SAMPLE = 128, 256
-HOPELESS = 20.0  # nats; cells farther below the likeliest cell are omitted from the sums
+# Cells that re-ranked ones are chosen from, and re-ranked ones: in the first batch, and all.
+CHOSEN, FIRST_CHOSEN = 1024, 256
+RERANKED, FIRST_RERANKED = 64, 32
+RERANKED_SAMPLE, POOL = 64, 16  # of the other cells; it is drawn from this multiple of its size
+WINDOWS = 8  # ranges of the likelihood, each with a shift of its own
+MARGIN = 20.0  # nats below the best cell at which an upper bound of a quick sum is enough
+LEAST_SHARE = 1e-3  # of the chance; if all others have less, no more cells are re-ranked
+# Cells that are summed up one by one; every eighth of the others represents them.
+LIKELIEST, THINNED = 4096, 8
+# Nats; cells farther below the likeliest cell are omitted, before re-ranking and after.
+NEGLIGIBLE, HOPELESS = 30.0, 20.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -122,8 +139,11 @@ def try_cells(
     places = _without_signatures(index.database, slice(None))
     radius = min(radius, city_extent(places))
     with_lean = np.zeros(len(cells), np.bool_)
-    if columns is not None and omitted_class is None:
-        with_lean[np.flatnonzero(columns.counts[numbers, :, cells].any(axis=1))[:LEANS]] = True
+    if columns is not None:
+        bases = columns.bases(None if omitted_class is None else omitted_class[0])
+        if omitted_class is None:
+            seeing = columns.counts[numbers, :, cells].any(axis=1)
+            with_lean[np.flatnonzero(seeing)[:LEANS]] = True
 
     def answer(item: tuple[int, Signature]) -> tuple[float, ...]:
         trial, query = item
@@ -131,14 +151,13 @@ def try_cells(
         if not len(query):
             return 0.0, 0.0, 0.0, float(np.log2(len(places))), np.nan
         if columns is None:
-            scores = index.scores(query)
-        elif omitted_class is None:
-            scores = CellScores(loglik=columns.scores(query, look))
+            scores = index.scores(query).loglik
         else:
-            class_row, rows = omitted_class
-            scores = CellScores(loglik=columns.scores(query, look, omitted_class=class_row)[rows])
+            scores = columns.scores(query, look, bases=bases, margin=NEGLIGIBLE)
+            scores = scores if omitted_class is None else scores[omitted_class[1]]
+        some = _thinned(cell, scores)
         own = partial(columns.loglik, cell, look) if columns and with_lean[trial] else None
-        return _outcome(index, places, cell, query, radius, scores, own)
+        return _outcome(index, places, cell, query, radius, some, own)
 
     outcomes: list[tuple[float, ...]] = []
     trials = zip(range(len(cells)), queries, strict=False)
@@ -174,23 +193,119 @@ def _without_signatures(
     )
 
 
+class _SomeCells(NamedTuple):
+    """Rows and scores of some cells, and the number of cells that each represents."""
+
+    rows: NDArray[np.int64]
+    scores: NDArray[np.float32]
+    weights: NDArray[np.float64]
+
+
+def _thinned(cell: int, scores: NDArray[np.float32]) -> _SomeCells:
+    """Return the likeliest cells, a sample of the others, and a cell that must be there.
+
+    Cells that are `NEGLIGIBLE` are left out.
+    """
+    whole = np.zeros(len(scores), np.bool_)
+    whole[promising_cells(scores, min(LIKELIEST, len(scores)))] = True
+    kept = whole.copy()
+    kept[::THINNED] = True
+    least = scores.max() - np.float32(NEGLIGIBLE)
+    kept &= scores > least
+    if not kept[cell]:
+        kept[cell] = whole[cell] = True
+    rows = np.flatnonzero(kept)
+    weights = np.where(whole[rows], 1.0, THINNED)
+    return _SomeCells(rows, np.maximum(scores[rows], least), weights)
+
+
+def _one_to_one(index: LikelihoodIndex, query: Signature, some: _SomeCells) -> NDArray[np.float64]:
+    """Return the log-likelihood of a query in some cells, summed over one-to-one associations.
+
+    It is as in `rerank`, but faster: computed for the likeliest cells and for a sample of the
+    others, which are shifted by as much as the cells of the sample with similar scores.
+    """
+    (photo,) = View.of(query).split()
+    scores = some.scores.astype(np.float64)
+    quick = quick_scorer(index, photo, CellScores(loglik=scores), north_sigma=0.0)
+    table = PhotoTable.of(photo, index.table)
+
+    def exact(cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        objects = visible_objects_in(index.database, some.rows[cells])
+        turns = np.zeros((len(cells), 1))
+        return photo_loglik(table, objects, *index.models, turns=turns)[:, 0]
+
+    # Choose some of the cells with the best first scores by quick sums.
+    choice = promising_cells(some.scores, min(CHOSEN, len(scores)))
+    choice = choice[np.argsort(-scores[choice], kind="stable")]
+    first, later = choice[:FIRST_CHOSEN], choice[FIRST_CHOSEN:]
+    sums, _ = quick(some.rows[first], np.full(len(first), -np.inf))
+    least = np.full(len(later), sums.max() - MARGIN)
+    sums = np.concatenate([sums, quick(some.rows[later], least)[0]])
+    order = np.argsort(-sums, kind="stable")
+    choice, sums = choice[order], sums[order]
+    # The others change by as much as these, unless they matter: then by as much as a sample.
+    after = exact(choice[:FIRST_RERANKED])
+    before, half = sums[: len(after)], len(after) // 2
+    rest = np.ones(len(scores), np.bool_)
+    rest[choice] = False
+    others = np.flatnonzero(rest)
+    moves = np.logaddexp.reduce(after) - np.logaddexp.reduce(before)
+    all_moves = moves + np.logaddexp.reduce(sums) - np.logaddexp.reduce(scores[choice])
+    loglik = scores + all_moves
+    loglik[choice] = sums + moves
+    loglik[choice[: len(after)]] = after
+    if log_sum(loglik) - log_sum(after[:half]) < LEAST_SHARE:
+        return np.asarray(loglik)
+    ranked, left = choice[len(after) : RERANKED], choice[RERANKED:]
+    samples = _sample(sums[RERANKED:]), _sample(scores[others])
+    new = exact(np.concatenate([ranked, left[samples[0]], others[samples[1]]]))
+    loglik[ranked] = new[: len(ranked)]
+    new = new[len(ranked) :]
+    previous = sums[RERANKED:], scores[others]
+    for cells, old, sample in zip((left, others), previous, samples, strict=True):
+        if len(cells):
+            loglik[cells] = old + _shifts(old, old[sample], new[: len(sample)])
+        new = new[len(sample) :]
+    return np.asarray(loglik)
+
+
+def _sample(scores: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return a sample of cells by falling score, more of the likely ones than of the others."""
+    pool = np.arange(0, len(scores), max(1, len(scores) // (POOL * RERANKED_SAMPLE)))
+    pool = pool[np.argsort(-scores[pool], kind="stable")]
+    ranks = np.geomspace(1, max(len(pool), 1), RERANKED_SAMPLE).astype(np.int64)
+    return pool[np.unique(ranks[ranks <= len(pool)]) - 1]
+
+
+def _shifts(
+    scores: NDArray[np.float64], before: NDArray[np.float64], after: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return how much some scores change, by those of a sample (falling) before and after.
+
+    The changes of the chance in successive parts of the sample are interpolated.
+    """
+    starts = np.arange(0, len(before), RERANKED_SAMPLE // WINDOWS)
+    moves = np.logaddexp.reduceat(after, starts) - np.logaddexp.reduceat(before, starts)
+    levels = np.add.reduceat(before, starts) / np.diff(np.append(starts, len(before)))
+    return np.asarray(np.interp(scores, levels[::-1], moves[::-1]))
+
+
 def _outcome(  # noqa: PLR0917 - a private helper of one caller
     index: LikelihoodIndex,
     places: SignatureDatabase,
     cell: int,
     query: Signature,
     radius: float,
-    scores: CellScores,
+    some: _SomeCells,
     own: Callable[[NDArray[np.int64]], NDArray[np.float64]] | None = None,
 ) -> tuple[float, ...]:
     """Return the outcome of one simulated query: the fields of `Trials` from ``itself`` on."""
-    loglik = rerank(
-        index, query, scores, count=RERANKED, off_centre=False, sample=RERANKED_SAMPLE
-    ).loglik
+    loglik = _one_to_one(index, query, some)
     possible = loglik > loglik.max() - HOPELESS
-    possible[cell] = True
-    cells = np.flatnonzero(possible)
-    answer = posterior(_without_signatures(places, cells), loglik[cells])
+    possible[np.searchsorted(some.rows, cell)] = True
+    cells, weights = some.rows[possible], some.weights[possible]
+    answer = posterior(_without_signatures(places, cells), loglik[possible] + np.log(weights))
     true = int(np.searchsorted(cells, cell))
     best, _ = answer.best_place(radius)
     near = float(answer.mass_within(radius, np.array([true]))[0])
@@ -203,7 +318,7 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
         min(float(answer.chances[true]), near),
         near,
         float(apart <= radius + 1e-6),
-        answer.entropy,
+        answer.entropy + float((answer.chances * np.log2(weights)).sum()),
         np.nan
         if own_loglik is None
         else float((answer.chances * own_loglik).sum() - own_loglik[true]),
