@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import shutil
+import subprocess
+import sys
 import tempfile
 import time
 from contextlib import contextmanager
@@ -23,7 +25,10 @@ from semsig_gis.database import (
     ViewpointSpec,
     build_tile,
     build_tiles,
+    open_database,
+    open_store,
     plan_tiles,
+    save_with_store,
     update_tiles,
 )
 from semsig_gis.objects import build_objects, open_objects, save_objects
@@ -44,6 +49,14 @@ _ROW = 10  # towns from west to east
 _SAMPLE = 12  # tiles to build again and compare
 _MOST_MB = 2048.0
 _CHANGED = 0.01  # share of the objects
+_SEEN = 12  # objects in the view that is localized
+_ANSWER = """
+import atexit, sys
+from benchmarks.memory import own_peak
+from semsig_gis.cli import main
+atexit.register(lambda: print(own_peak(), file=sys.stderr))
+main()
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +98,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
             if single.manifest != two.manifest:
                 raise ArithmeticError("the results of one and of two processes differ.")
             updates = list(_updates(folder, scale, address))
+        answers = list(_answers(folder))
     what = f"{two.manifest.cells:,} cells of {scale.towns} towns in {len(two.manifest.parts)} tiles"
     print(
         f"{what}: {two.manifest.cells / two.seconds:,.0f} cells a second; the files of one process "
@@ -115,6 +129,45 @@ def comparisons(size: str) -> Iterator[Comparison]:
         bar=0.8,
     )
     yield from updates
+    yield from answers
+
+
+def _answers(folder: Path) -> Iterator[Comparison]:
+    """Compare `semsig localize` in the tiles and in one file of the same cells."""
+    database = open_database(folder / "country")
+    save_with_store(database, open_store(folder / "country"), folder / "country.semsig.parquet")
+    view = database.signature(int(np.abs(database.lengths - _SEEN).argmin()))
+    seen = {
+        "types": database.taxonomy.decode(view.codes),
+        "bearings": ",".join(f"{bearing:.2f}" for bearing in view.bearings),
+    }
+    options = [text for name, value in seen.items() for text in (f"--{name}", value)]
+    for name in ("country", "country.semsig.parquet"):
+        _answer(folder / name, options)  # so that the files are in memory and kernels compiled
+    (tiles, *ours), (file, *peer) = (
+        _answer(folder / name, options) for name in ("country", "country.semsig.parquet")
+    )
+    if tiles != file:
+        raise ArithmeticError("the answers of the tiles and of one file differ.")
+    for what, unit, mine, other in zip(
+        ("time", "peak memory"), ("s", "MB"), ours, peer, strict=True
+    ):
+        yield Comparison(
+            name=f"{what} of `semsig localize` in the tiles of {len(database):,} cells",
+            unit=unit,
+            ours=mine,
+            peer=other,
+            peer_name="in one file",
+            bar=None,
+        )
+
+
+def _answer(database: Path, options: list[str]) -> tuple[str, float, float]:
+    """Localize a view in a new process; return its output, its seconds and its peak memory."""
+    command = [sys.executable, "-c", _ANSWER, "localize", str(database), *options, "--json"]
+    start = time.perf_counter()
+    run = subprocess.run(command, capture_output=True, text=True, check=True)  # noqa: S603
+    return run.stdout, time.perf_counter() - start, float(run.stderr.split()[-1])
 
 
 def _updates(folder: Path, scale: _Size, scheduler: str) -> Iterator[Comparison]:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 CELL_M = 16.0
 # Most cells of the grid for a point; beyond, for points far apart, the cells are larger.
-MOST_CELLS_A_POINT = 16
+MOST_CELLS_A_POINT = 4
 _ROUNDING = 1e-9
 
 

@@ -101,7 +101,9 @@ def log_sum(logs: NDArray[np.floating]) -> float:
     top = float(logs.max(initial=-math.inf))
     if math.isinf(top):
         return top
-    return top + math.log(float(np.exp(logs - top).sum()))
+    shares = logs - top
+    np.exp(shares, out=shares)
+    return top + math.log(float(shares.sum()))
 
 
 def _deviations(percent: float) -> float:

@@ -27,6 +27,7 @@ from semsig_gis.database.file import (
     INPUTS,
     KIND,
     Manifest,
+    PartitionedDatabase,
     is_folder,
     open_database,
     open_dataset,
@@ -55,7 +56,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Axes, MapFrame
     from semsig_gis.database.database import CellGeometry
-    from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.place_names import PlaceNames
     from semsig_gis.database.store import ObjectStore
     from semsig_gis.objects import StreetObjects
@@ -116,12 +116,15 @@ class City(Displayed):
     @cached_property
     def database(self) -> SignatureDatabase:
         """The whole database (see `open_database`)."""
+        dataset = self.dataset if self._in_parts else None
+        if isinstance(dataset, PartitionedDatabase):
+            return self._read(lambda _: dataset.whole())
         return self._read(open_database)
 
     @cached_property
     def dataset(self) -> SignatureDatabase | PartitionedDatabase:
         """The database; if it is in parts, without reading them all (see `open_dataset`)."""
-        return open_dataset(self.path) if self._in_parts else self.database
+        return self._read(open_dataset) if self._in_parts else self.database
 
     @property
     def licenses(self) -> tuple[str, ...]:

@@ -271,6 +271,10 @@ class SignatureDatabase(Displayed):
         """What other packages computed from the database and keep with it, such as an index."""
         return []
 
+    def xy_of(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the viewpoints of some cells, by row, in metres, shape (c, 2)."""
+        return self.grid.viewpoints(self.columns[cells], self.rows[cells])
+
     def cells_at(self, xy: ArrayLike) -> NDArray[np.int64]:
         """Return the rows of the cells that contain places, -1 for places in no cell, shape (p,).
 
@@ -290,7 +294,7 @@ class SignatureDatabase(Displayed):
         """Return a database of some cells: a slice or mask of the rows, or rows in their order."""
         by_row = isinstance(cells, np.ndarray) and cells.dtype.kind == "i"
         rows = cells if by_row else np.arange(len(self))[cells]
-        lengths = self.lengths[rows]
+        lengths = self.offsets[rows + 1] - self.offsets[rows]
         entries = consecutive(self.offsets[rows], lengths)
         arrays: dict[str, Any] = {
             **{name: getattr(self, name)[rows] for name in CELL_ARRAYS},

@@ -6,7 +6,8 @@ import hashlib
 import json
 import os
 import zlib
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from itertools import groupby, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,10 +24,16 @@ from semsig_gis.core import (
     SignatureSpec,
     Taxonomy,
     brief,
+    each_in_order,
     remove_abandoned,
     split_ids,
 )
-from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
+from semsig_gis.database.database import (
+    CELL_ARRAYS,
+    SignatureDatabase,
+    join_databases,
+    require_same,
+)
 from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.storage import (
     digest,
@@ -176,7 +183,7 @@ def open_database(path: str | Path) -> SignatureDatabase:
     give a signature database file.
     """
     if is_folder(path):
-        return join_databases([open_database(part) for part in part_files(path)])
+        return open_dataset(path).whole()
     columns = ["cell_id", "types", "bearings", "distances"]
     table, specs, crs = read_geoparquet(path, kind=KIND, columns=columns, optional=[EXTENTS])
     database = database_of(table, specs, crs, path=path)
@@ -438,7 +445,8 @@ def part_files(folder: str | Path) -> tuple[Path, ...]:
     """Return the part files of a database, ordered by tile; DatabaseError if it is incomplete."""
     manifest = read_manifest(folder)
     folder = Path(folder)
-    for part in manifest.parts:
+
+    def require_part(part: PartFile) -> None:
         path = folder / part.file
         if not path.is_file():
             raise DatabaseError(
@@ -448,6 +456,9 @@ def part_files(folder: str | Path) -> tuple[Path, ...]:
             raise DatabaseError(
                 f"{path} is not the part that was built; put it back or build the database again."
             )
+
+    for _ in each_in_order(require_part, manifest.parts):
+        pass
     others = {path.name for path in folder.glob("*.parquet")} - {p.file for p in manifest.parts}
     if others:
         raise DatabaseError(
@@ -468,6 +479,8 @@ class PartitionedDatabase(Displayed):
         The part files; they have no common cell.
     cells : int
         Number of cells in all parts.
+    tiles : tuple of PartFile, optional
+        The parts as in the manifest, ordered by tile, if they are tiles.
 
     Examples
     --------
@@ -484,12 +497,57 @@ class PartitionedDatabase(Displayed):
 
     files: tuple[Path, ...]
     cells: int
+    tiles: tuple[PartFile, ...] = ()
 
     def __len__(self) -> int:  # noqa: D105
         return self.cells
 
     def _facts(self) -> dict[str, object]:
         return {"cells": self.cells, "parts": len(self.files)}
+
+    def whole(self) -> SignatureDatabase:
+        """Return all cells at once; DatabaseError if the parts do not fit together.
+
+        The cells of a column of tiles follow those of the column before, so that only one column is
+        in memory twice.
+        """
+        if not self.tiles:
+            return join_databases(list(self.parts()))
+        arrays: dict[str, NDArray[Any]] = {
+            name: np.empty(self.cells, np.int32) for name in CELL_ARRAYS
+        }
+        offsets = np.zeros(self.cells + 1, np.int64)
+        size, strips = sum(part.entries for part in self.tiles), []
+        parts, cells, entries = map(open_database, self.files), 0, 0
+        for _, tiles in groupby(self.tiles, key=lambda part: part.tile[0]):
+            column = list(tiles)
+            strip = join_databases(list(islice(parts, len(column))))
+            strips.append(strip.select(slice(0)))
+            require_same(strips[0], strip)
+            end, last = cells + len(strip), entries + len(strip.codes)
+            listed = sum(part.cells for part in column), sum(part.entries for part in column)
+            follows = cells == 0 or arrays["columns"][cells - 1] < strip.columns[0]
+            if not follows or listed != (len(strip), len(strip.codes)):
+                raise DatabaseError(
+                    f"{self.files[0].parent} has other cells than its manifest lists; build the "
+                    "database again."
+                )
+            for name in CELL_ARRAYS:
+                arrays[name][cells:end] = getattr(strip, name)
+            for name, values in strip.entry_arrays.items():
+                # Parts without extents have none of these values: zeros.
+                if name not in arrays:
+                    arrays[name] = np.zeros(size, values.dtype)
+                arrays[name][entries:last] = values
+            offsets[cells + 1 : end + 1] = strip.offsets[1:] + entries
+            cells, entries = end, last
+        return replace(
+            strips[0],
+            offsets=offsets,
+            licenses=tuple(dict.fromkeys(line for strip in strips for line in strip.licenses)),
+            notes=tuple(dict.fromkeys(note for strip in strips for note in strip.notes)),
+            **arrays,
+        )
 
     def parts(self) -> Iterator[SignatureDatabase]:
         """Yield the parts one by one; DatabaseError if they were built with different settings."""
@@ -557,4 +615,5 @@ def open_dataset(folder: str | Path) -> PartitionedDatabase:
     semsig_gis.core.errors.DatabaseError: nowhere is not a signature database in parts (it has no \
     _manifest.json); give a folder that `semsig build --tile` wrote.
     """
-    return PartitionedDatabase(part_files(folder), read_manifest(folder).cells)
+    files, manifest = part_files(folder), read_manifest(folder)
+    return PartitionedDatabase(files, manifest.cells, manifest.parts)

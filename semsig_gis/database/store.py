@@ -499,6 +499,8 @@ def _read_ground(
     files: dict[str, Path], crs: CRS, box: Sequence[float] | None = None
 ) -> tuple[gpd.GeoDataFrame | None, gpd.GeoDataFrame | None]:
     """Return the buildings and the streets in files by role, None without a file."""
+    if not files:
+        return None, None
     from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it takes 320 ms to load
 
     roles: tuple[Literal["buildings", "streets"], ...] = ("buildings", "streets")

@@ -23,7 +23,6 @@ from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD, InputError, Signature, e
 from semsig_gis.database import (
     City,
     PartitionedDatabase,
-    join_databases,
     open_city,
     whole_database,
 )
@@ -174,7 +173,7 @@ def make_locator(
             options["store"] = database.store
         database = database.database
     elif isinstance(database, PartitionedDatabase):
-        database = join_databases(list(database.parts()))
+        database = database.whole()
     if requirement is not None:
         # The module imports GeoPandas, which takes 0.3 s.
         from semsig_gis.localization.likelihood.priors import weight_prior  # noqa: PLC0415

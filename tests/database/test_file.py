@@ -3,6 +3,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -275,6 +276,15 @@ def test_an_incomplete_folder_is_refused(
         (parts / name).unlink()
     with refused(DatabaseError, "lists no parts"):
         opened(parts)
+
+
+def test_parts_with_other_cells_than_listed_are_refused(parts: Path) -> None:
+    manifest = read_manifest(parts)
+    first, *others = manifest.parts
+    for wrong in (replace(first, cells=first.cells + 1), replace(first, entries=first.entries - 1)):
+        Manifest(manifest.recipe, (wrong, *others)).write(parts)
+        with refused(DatabaseError, str(parts), "other cells than its manifest lists"):
+            open_database(parts)
 
 
 def test_parts_with_different_settings_or_common_cells_are_refused(

@@ -12,7 +12,6 @@ import numpy as np
 from semsig_gis.core import EmptyResultError, map_with
 from semsig_gis.database import (
     PartitionedDatabase,
-    join_databases,
     rows_of_result,
     whole_database,
 )
@@ -231,7 +230,7 @@ class DistanceLocator:
             return
         database = self.database
         if isinstance(database, PartitionedDatabase):
-            database = join_databases(list(database.parts()))
+            database = database.whole()
         # Cached arrays of the database are computed before the time is measured.
         parts = self.method.used(queries[0])
         if parts not in self._warm_parts:

@@ -115,7 +115,7 @@ class AnswerRule:
         """
         best = posterior.places(1, radius=self.radius) if places is None else places
         cell, mass = int(best.centres[0]), round(float(best.chances[0]), 9)
-        x, y = posterior.database.xy[cell].tolist()
+        x, y = posterior.database.xy_of(cell).tolist()
         return Decision(cell=cell, x=x, y=y, mass=mass, given=self.answers(mass))
 
 

@@ -405,7 +405,9 @@ def rerank(
     loglik[choice[left]] = before[left] + ranked.move - prior[choice[left]]
     for cells, old, usual in ((choice[left], before[left], ranked.move), (rest, total[rest], move)):
         if len(cells) and log_sum(old) + usual > reached + LOG_LEAST_SHARE:
-            loglik[cells] = old + _changes(rank, cells, old, size=sample) - prior[cells]
+            changed = old + _changes(rank, cells, old, size=sample)
+            changed -= prior[cells]
+            loglik[cells] = changed
     loglik[ranked.cells] = ranked.after - prior[ranked.cells]
     return replace(_with_turns(scores, ranked), loglik=loglik)
 

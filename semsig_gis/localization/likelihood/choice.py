@@ -82,9 +82,9 @@ def _by_turn(
     """Return the log-likelihood of a photo in some cells by turn in degrees, both of one shape."""
     shifts = np.rint(turns * (BINS / FULL_TURN)).astype(np.int64) % BINS
     logliks = np.empty(turns.shape)
-    objects, model = index.objects, index.levels.model
+    (objects, rows), model = index.objects_of(cells), index.levels.model
     share_rows(
-        lambda part: _associate_cells(part, cells, least, objects, model, photo, shifts, logliks),
+        lambda part: _associate_cells(part, rows, least, objects, model, photo, shifts, logliks),
         len(cells),
         least=CELLS_A_THREAD,
     )

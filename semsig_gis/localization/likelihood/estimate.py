@@ -145,7 +145,7 @@ def cell_estimate(
     reach = math.ceil(radius / database.grid.step)
     ends = database.columns[cell] + np.array([-reach, reach + 1])
     near = np.arange(*np.searchsorted(database.columns, ends))
-    away = database.xy[near] - database.xy[cell]
+    away = database.xy_of(near) - database.xy_of(cell)
     inside = near[np.hypot(away[:, 0], away[:, 1]) <= radius]
     view = View.of(query)
     photo = view.split()[0]
@@ -164,7 +164,7 @@ def cell_estimate(
         heading_sigmas = np.sqrt((shares * off**2).sum(axis=1) + HEADING_STEPS[-1] ** 2 / 12.0)
     parts = Refinement(
         cells=inside,
-        places=database.xy[inside],
+        places=database.xy_of(inside),
         sizes=np.full(len(inside), database.grid.step),
         loglik=np.zeros(len(inside)),
         headings=headings,

@@ -253,7 +253,7 @@ def explain_cell(
     columns ``object``, ``source`` and ``source_id`` are missing, and places of objects are exact to
     some decimetres.
     """
-    x, y = database.xy[cell].tolist()
+    x, y = database.xy_of(cell).tolist()
     view = visible_objects_in(database, np.array([cell]))
     codes, radius = database.present_codes, database.spec.radius
     scene = _Scene((x, y), view, codes, database.taxonomy, database.crs, radius)

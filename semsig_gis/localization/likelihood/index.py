@@ -22,6 +22,7 @@ from semsig_gis.core import (
     FULL_TURN,
     WILDCARD,
     Displayed,
+    consecutive,
     crs_label,
     share_rows,
 )
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     _PhotoScores = tuple[NDArray[np.float32], NDArray[np.float32] | None]
     _Scorer = Callable[[BinnedObjects], _PhotoScores]
 
+BIN_OF = (np.arange(BEARING_UNITS) * BINS // BEARING_UNITS).astype(np.uint16)
 FINE = 8 * BINS
 """Bearing steps of a detection."""
 EXACT_GROUPS = 4  # classes with more different errors are grouped by similar ones
@@ -74,6 +76,10 @@ EXTENT_RATIO = 3.0  # of errors of extended things that do
 LENGTH_ODDS = 2.0  # ratio of odds up to which lengths of signatures share a row
 FIRST_DETECTIONS, FIRST_TURNED_DETECTIONS = LANES, 12
 """Detections of a photo by which cells are chosen, if its north is known and if not."""
+
+MOST_HELD = 1 << 24  # objects of all cells that an index keeps, in three bytes each
+CELLS_A_BLOCK = 1 << 17
+"""Cells that are scored at once if their objects are not kept."""
 
 VERSION = 6  # increased whenever the same database and noise give other likelihoods
 POINTS_A_SIDE = 3  # of the grid of points in a cell at which the best cells are compared
@@ -181,10 +187,46 @@ class LikelihoodIndex(Displayed):
     @cached_property
     def objects(self) -> BinnedObjects:
         """The objects of all cells, as `kernels.scan` takes them."""
+        return self._binned(self.database.offsets, slice(None))
+
+    @property
+    def _is_held(self) -> bool:
+        """Whether `objects` are kept in memory for the next question."""
+        return "objects" in vars(self) or len(self.database.codes) <= MOST_HELD
+
+    def objects_of(self, cells: NDArray[np.int64]) -> tuple[BinnedObjects, NDArray[np.int64]]:
+        """Return the objects of at least some cells, by row, and the place of each of these."""
+        if self._is_held:
+            return self.objects, cells
+        starts = self.database.offsets[cells]
+        lengths = self.database.offsets[cells + 1] - starts
+        entries = consecutive(starts, lengths)
+        return self._binned(np.append(0, np.cumsum(lengths)), entries), np.arange(len(cells))
+
+    def _binned(
+        self, offsets: NDArray[np.int64], entries: slice | NDArray[np.int64]
+    ) -> BinnedObjects:
+        """Return some objects by place, given their rows among those of all cells."""
         database = self.database
-        bin_of = (np.arange(BEARING_UNITS) * BINS // BEARING_UNITS).astype(np.uint16)
-        bins = bin_of[database.bearing_units]
-        return self.levels.objects(database.offsets, database.codes, bins, database.distance_units)
+        return self.levels.objects(
+            offsets,
+            database.codes[entries],
+            BIN_OF[database.bearing_units[entries]],
+            database.distance_units[entries],
+        )
+
+    def _scan(self, scorer: _Scorer) -> _PhotoScores:
+        """Return the scores of a photo in all cells, block by block if there are very many."""
+        if self._is_held:
+            return scorer(self.objects)
+        scores, headings = [], []
+        for start in range(0, len(self.database), CELLS_A_BLOCK):
+            offsets = self.database.offsets[start : start + CELLS_A_BLOCK + 1]
+            block = self._binned(offsets - offsets[0], slice(offsets[0], offsets[-1]))
+            for values, parts in zip(scorer(block), (scores, headings), strict=True):
+                parts.append(values)
+        known = headings[0] is None
+        return np.concatenate(scores), None if known else np.concatenate(headings)
 
     @cached_property
     def memo(self) -> dict[Any, Any]:
@@ -202,7 +244,7 @@ class LikelihoodIndex(Displayed):
         """
 
         def score_photo(photo: View, sigma: float) -> _PhotoScores:
-            return photo_scorer(photo, self.levels, sigma)(self.objects)
+            return self._scan(photo_scorer(photo, self.levels, sigma))
 
         return self.scores_by_photo(query, north_sigma, score_photo)
 
@@ -219,10 +261,10 @@ class LikelihoodIndex(Displayed):
             if share < 1.0:
                 photo = photo.select(np.linspace(0, len(photo) - 1, most).round().astype(np.int64))
             if sigma == 0.0:
-                return gain_scorer(photo, self.levels, share=share)(self.objects)
+                return self._scan(gain_scorer(photo, self.levels, share=share))
             wide = sigma >= LEAST_WIDE_SIGMA and is_plain(photo)
             scorer = profile_scorer if wide else photo_scorer
-            return scorer(photo, self.levels, sigma, share=share)(self.objects)
+            return self._scan(scorer(photo, self.levels, sigma, share=share))
 
         return self.scores_by_photo(query, north_sigma, score_photo)
 

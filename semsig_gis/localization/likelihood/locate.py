@@ -675,7 +675,8 @@ class LikelihoodLocator:
             if store is not None and len(usable) and shares[number] >= LEAST_REFINED:
                 parts = self.parts(query, scores, posterior, store)
                 scores, posterior = _with_parts(parts, scores, posterior)
-            chances += shares[number] * posterior.chances
+            if len(versions) > 1:
+                chances += shares[number] * posterior.chances
         if len(versions) > 1:
             posterior = replace(posterior, chances=chances / chances.sum())
         places = posterior.places(top, radius=self.rule.radius)
@@ -752,7 +753,7 @@ class LikelihoodLocator:
             extra = reading.extra[cells]
         parts = refine(
             reading.view,
-            database.xy[cells],
+            database.xy_of(cells),
             place_noise(self.index.noise, database.grid.step),
             store=store if reading.store is None else reading.store,
             step=database.grid.step,
@@ -782,7 +783,7 @@ class LikelihoodLocator:
                 view, cell, noise, database=database, heading=headings, plain=reading.plain
             )
             return explanation.numbered(reading.rows) if divided else explanation
-        x, y = database.xy[cell].tolist()
+        x, y = database.xy_of(cell).tolist()
         if parts is not None and len(inside := np.flatnonzero(parts.cells == cell)):
             best = inside[parts.loglik[inside].argmax()]
             x, y = parts.places[best].tolist()

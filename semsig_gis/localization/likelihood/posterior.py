@@ -24,7 +24,7 @@ from semsig_gis.core import (
     signed_degrees,
 )
 from semsig_gis.database import TOLERANCE_M, visible_objects_at
-from semsig_gis.localization.likelihood.index import own_sigma, photo_power
+from semsig_gis.localization.likelihood.index import CELLS_A_BLOCK, own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.localization.likelihood.turns import turn_logs
 from semsig_gis.localization.noise.model import cell_noise
@@ -317,12 +317,13 @@ def posterior(
         raise InputError("a likelihood or a prior is not a number or is infinite; give logarithms.")
     if top == -np.inf:
         raise InputError("the prior excludes every cell that the query may be in; widen it.")
-    chances = np.exp(total - top)
+    total -= top
+    chances = np.exp(total, out=total)
     prior = math.log(total.size) if log_prior is None else log_sum(log_prior)
+    mass = chances.sum()
+    chances /= mass
     return Posterior(
-        database=database,
-        chances=chances / chances.sum(),
-        log_evidence=float(top + np.log(chances.sum()) - prior),
+        database=database, chances=chances, log_evidence=float(top + np.log(mass) - prior)
     )
 
 

@@ -28,7 +28,7 @@ def noise_with_objects_beyond(noise: Noise, database: SignatureDatabase) -> Nois
     present = database.present_codes
     classes = [database.taxonomy.by_code(code) for code in present.tolist()]
     ranges = database.taxonomy.ranges(database.spec.radius)[present]
-    counts = np.bincount(database.codes, minlength=256)[present] / len(database)
+    counts = database.occurrences[present] / len(database)
     densities = counts / (np.pi * ranges**2)
 
     def change(spec: NoiseSpec) -> NoiseSpec:

@@ -265,7 +265,7 @@ def database_tables(
         noise,
         taxonomy=database.taxonomy,
         codes=database.present_codes,
-        longest=min(int(database.lengths.max()), LONGEST_TABLE),
+        longest=min(int(np.diff(database.offsets).max()), LONGEST_TABLE),
         radius=database.spec.radius,
     )
 

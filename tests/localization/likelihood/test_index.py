@@ -22,10 +22,12 @@ from semsig_gis.localization import (
     IncrementalIndex,
     build_index,
     index_fingerprint,
+    locate,
     named_noise,
     promising_cells,
 )
 from semsig_gis.localization.likelihood import incremental
+from semsig_gis.localization.likelihood import index as index_module
 from semsig_gis.observation import Photo, View
 
 if TYPE_CHECKING:
@@ -152,6 +154,27 @@ def test_scores_do_not_depend_on_the_threads(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("semsig_gis.core.threads.ROWS_A_PART", 50)
     monkeypatch.setattr("semsig_gis.core.threads.cores", lambda: 3)
     assert np.array_equal(build_index(database, NOISE).scores(query).loglik, expected)
+
+
+@pytest.mark.parametrize("north_sigma", [0.0, 20.0])
+def test_scores_by_block_equal_those_of_all_cells(
+    monkeypatch: pytest.MonkeyPatch, north_sigma: float
+) -> None:
+    database = random_database(5, cells=100)
+    view = View.of(database.signature(3))
+    held = locate(build_index(database, NOISE), view, north_sigma=north_sigma)
+    monkeypatch.setattr(index_module, "MOST_HELD", 0)
+    monkeypatch.setattr(index_module, "CELLS_A_BLOCK", 7)
+    index = build_index(database, NOISE)
+    for scored in (index.scores, index.first_scores):
+        scores = scored(view, north_sigma=north_sigma)
+        assert len(scores.loglik) == len(database)
+        assert (scores.heading is None) == (north_sigma == 0.0)
+    by_block = locate(index, view, north_sigma=north_sigma)
+    assert "objects" not in vars(index)
+    assert by_block.loglik.tolist() == held.loglik.tolist()
+    assert by_block.chances.tolist() == held.chances.tolist()
+    assert by_block.to_dict() == held.to_dict()
 
 
 def test_the_fingerprint_depends_on_database_and_noise() -> None:

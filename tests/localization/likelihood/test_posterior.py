@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 
 DATABASE = random_database(3, cells=120)
 FLAT = np.zeros(len(DATABASE))
+TINY_CHANCES = [0.0, 5e-324, 1e-310, 2.0**-1022, 1e-200, 1e-20, 0.25, 0.5]
 LOGLIKS = st.integers(0, 10_000).map(
     lambda seed: np.random.default_rng(seed).choice([-40.0, -3.0, -2.0, 0.0], len(DATABASE))
 )
@@ -395,3 +396,12 @@ def test_damaged_rules_are_refused(tmp_path: Path, text: str) -> None:
         open_rule(tmp_path / "rule.json")
     with refused(InputError, "none.json", "No such file"):
         open_rule(tmp_path / "none.json")
+
+
+@given(st.integers(0, 10_000), st.integers(1, len(DATABASE)))
+def test_the_likeliest_cells_are_those_of_a_sort(seed: int, count: int) -> None:
+    chances = np.random.default_rng(seed).choice(TINY_CHANCES, len(DATABASE))
+    order = np.argsort(-chances, kind="stable")
+    found = replace(posterior(DATABASE, FLAT), chances=chances).likeliest(count)
+    assert chances[found].tolist() == chances[order[:count]].tolist()
+    assert len(set(found.tolist())) == count
