@@ -136,12 +136,9 @@ def _answers(folder: Path) -> Iterator[Comparison]:
     """Compare `semsig localize` in the tiles and in one file of the same cells."""
     database = open_database(folder / "country")
     save_with_store(database, open_store(folder / "country"), folder / "country.semsig.parquet")
-    view = database.signature(int(np.abs(database.lengths - _SEEN).argmin()))
-    seen = {
-        "types": database.taxonomy.decode(view.codes),
-        "bearings": ",".join(f"{bearing:.2f}" for bearing in view.bearings),
-    }
-    options = [text for name, value in seen.items() for text in (f"--{name}", value)]
+    cell = int(np.abs(database.lengths - _SEEN).argmin())
+    bearings = database.bearings[database.offsets[cell] : database.offsets[cell + 1]].tolist()
+    options = ["--types", database.types(cell), "--bearings", ",".join(map(str, bearings))]
     for name in ("country", "country.semsig.parquet"):
         _answer(folder / name, options)  # so that the files are in memory and kernels compiled
     (tiles, *ours), (file, *peer) = (

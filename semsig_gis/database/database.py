@@ -271,8 +271,8 @@ class SignatureDatabase(Displayed):
         """What other packages computed from the database and keep with it, such as an index."""
         return []
 
-    def xy_of(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the viewpoints of some cells, by row, in metres, shape (c, 2)."""
+    def xy_of(self, cells: int | NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the viewpoint of a cell, by row, or of some, in metres, shape (..., 2)."""
         return self.grid.viewpoints(self.columns[cells], self.rows[cells])
 
     def cells_at(self, xy: ArrayLike) -> NDArray[np.int64]:
@@ -293,7 +293,7 @@ class SignatureDatabase(Displayed):
     def select(self, cells: slice | NDArray[np.int64] | NDArray[np.bool_]) -> SignatureDatabase:
         """Return a database of some cells: a slice or mask of the rows, or rows in their order."""
         by_row = isinstance(cells, np.ndarray) and cells.dtype.kind == "i"
-        rows = cells if by_row else np.arange(len(self))[cells]
+        rows = np.asarray(cells) if by_row else np.arange(len(self))[cells]
         lengths = self.offsets[rows + 1] - self.offsets[rows]
         entries = consecutive(self.offsets[rows], lengths)
         arrays: dict[str, Any] = {

@@ -513,9 +513,7 @@ class PartitionedDatabase(Displayed):
         """
         if not self.tiles:
             return join_databases(list(self.parts()))
-        arrays: dict[str, NDArray[Any]] = {
-            name: np.empty(self.cells, np.int32) for name in CELL_ARRAYS
-        }
+        arrays: dict[str, Any] = {name: np.empty(self.cells, np.int32) for name in CELL_ARRAYS}
         offsets = np.zeros(self.cells + 1, np.int64)
         size, strips = sum(part.entries for part in self.tiles), []
         parts, cells, entries = map(open_database, self.files), 0, 0

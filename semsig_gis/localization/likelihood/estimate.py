@@ -145,7 +145,7 @@ def cell_estimate(
     reach = math.ceil(radius / database.grid.step)
     ends = database.columns[cell] + np.array([-reach, reach + 1])
     near = np.arange(*np.searchsorted(database.columns, ends))
-    away = database.xy_of(near) - database.xy_of(cell)
+    away = np.subtract(database.xy_of(near), database.xy_of(cell))
     inside = near[np.hypot(away[:, 0], away[:, 1]) <= radius]
     view = View.of(query)
     photo = view.split()[0]

@@ -219,14 +219,14 @@ class LikelihoodIndex(Displayed):
         """Return the scores of a photo in all cells, block by block if there are very many."""
         if self._is_held:
             return scorer(self.objects)
-        scores, headings = [], []
+        parts = []
         for start in range(0, len(self.database), CELLS_A_BLOCK):
             offsets = self.database.offsets[start : start + CELLS_A_BLOCK + 1]
             block = self._binned(offsets - offsets[0], slice(offsets[0], offsets[-1]))
-            for values, parts in zip(scorer(block), (scores, headings), strict=True):
-                parts.append(values)
-        known = headings[0] is None
-        return np.concatenate(scores), None if known else np.concatenate(headings)
+            parts.append(scorer(block))
+        headings = [heading for _, heading in parts if heading is not None]
+        scores = np.concatenate([score for score, _ in parts])
+        return scores, np.concatenate(headings) if headings else None
 
     @cached_property
     def memo(self) -> dict[Any, Any]:
