@@ -24,7 +24,7 @@ from semsig_gis.core import (
     signed_degrees,
 )
 from semsig_gis.database import TOLERANCE_M, visible_objects_at
-from semsig_gis.localization.likelihood.index import CELLS_A_BLOCK, own_sigma, photo_power
+from semsig_gis.localization.likelihood.index import own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.localization.likelihood.turns import turn_logs
 from semsig_gis.localization.noise.model import cell_noise

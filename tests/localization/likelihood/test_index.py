@@ -162,7 +162,7 @@ def test_scores_by_block_equal_those_of_all_cells(
 ) -> None:
     database = random_database(5, cells=100)
     view = View.of(database.signature(3))
-    held = locate(build_index(database, NOISE), view, north_sigma=north_sigma)
+    answer = locate(build_index(database, NOISE), view, north_sigma=north_sigma)
     monkeypatch.setattr(index_module, "MOST_HELD", 0)
     monkeypatch.setattr(index_module, "CELLS_A_BLOCK", 7)
     index = build_index(database, NOISE)
@@ -172,9 +172,9 @@ def test_scores_by_block_equal_those_of_all_cells(
         assert (scores.heading is None) == (north_sigma == 0.0)
     by_block = locate(index, view, north_sigma=north_sigma)
     assert "objects" not in vars(index)
-    assert by_block.loglik.tolist() == held.loglik.tolist()
-    assert by_block.chances.tolist() == held.chances.tolist()
-    assert by_block.to_dict() == held.to_dict()
+    assert by_block.loglik.tolist() == answer.loglik.tolist()
+    assert by_block.chances.tolist() == answer.chances.tolist()
+    assert by_block.to_dict() == answer.to_dict()
 
 
 def test_the_fingerprint_depends_on_database_and_noise() -> None:

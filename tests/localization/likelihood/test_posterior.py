@@ -402,6 +402,6 @@ def test_damaged_rules_are_refused(tmp_path: Path, text: str) -> None:
 def test_the_likeliest_cells_are_those_of_a_sort(seed: int, count: int) -> None:
     chances = np.random.default_rng(seed).choice(TINY_CHANCES, len(DATABASE))
     order = np.argsort(-chances, kind="stable")
-    found = replace(posterior(DATABASE, FLAT), chances=chances).likeliest(count)
-    assert chances[found].tolist() == chances[order[:count]].tolist()
-    assert len(set(found.tolist())) == count
+    rows = replace(posterior(DATABASE, FLAT), chances=chances).likeliest(count)
+    assert chances[rows].tolist() == chances[order[:count]].tolist()
+    assert len(set(rows.tolist())) == count
