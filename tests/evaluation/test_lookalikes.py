@@ -269,9 +269,9 @@ def test_scores_agree_with_a_plain_loop(seed: int, cells: int, margin: float) ->
             expected = np.where(others, expected - columns.missed[0, omitted], -np.inf)
         bases = columns.bases(omitted)
         scores = columns.scores(query, 0, bases=bases, margin=margin)
-        kept = np.isfinite(scores)
-        assert np.allclose(scores[kept], expected[kept], atol=1e-3)
-        assert (kept | ~(expected > expected.max() - margin + 1e-3)).all()
+        selection = np.isfinite(scores)
+        assert np.allclose(scores[selection], expected[selection], atol=1e-3)
+        assert (selection | ~(expected > expected.max() - margin + 1e-3)).all()
 
 
 @settings(max_examples=30, deadline=None)
@@ -285,9 +285,9 @@ def test_shifts_interpolate_the_changes_of_a_sample(seed: int, count: int, slope
     before = scores[sample]
     # The same change everywhere is found again; a change by score lies between its extremes.
     assert np.allclose(trial_module._shifts(scores, before, before - slope), -slope)
-    moved = trial_module._shifts(scores, before, before * (1.0 + slope))
-    assert moved.min() >= slope * before.min() - 1e-9
-    assert moved.max() <= slope * before.max() + 1e-9
+    shifts = trial_module._shifts(scores, before, before * (1.0 + slope))
+    assert shifts.min() >= slope * before.min() - 1e-9
+    assert shifts.max() <= slope * before.max() + 1e-9
 
 
 def test_similar_cells_are_neighbours() -> None:
@@ -302,7 +302,7 @@ def test_similar_cells_are_neighbours() -> None:
 def test_blocks_without_likely_cells_do_not_change_the_result(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # Several blocks, of which some are skipped: the likely cells and their places are the same.
+    # There are several blocks, and some are skipped. The likely cells and their places are the same.
     columns = symbol_columns(build_index(large_city(9, 5000), named_noise("medium")))
     monkeypatch.setattr(lookalikes, "LIKELY_CELLS", 40)
     some = np.arange(0, 5000, 250)

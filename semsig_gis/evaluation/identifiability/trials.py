@@ -208,13 +208,13 @@ def _thinned(cell: int, scores: NDArray[np.float32]) -> _SomeCells:
     """
     whole = np.zeros(len(scores), np.bool_)
     whole[promising_cells(scores, min(LIKELIEST, len(scores)))] = True
-    kept = whole.copy()
-    kept[::THINNED] = True
+    selection = whole.copy()
+    selection[::THINNED] = True
     least = scores.max() - np.float32(NEGLIGIBLE)
-    kept &= scores > least
-    if not kept[cell]:
-        kept[cell] = whole[cell] = True
-    rows = np.flatnonzero(kept)
+    selection &= scores > least
+    if not selection[cell]:
+        selection[cell] = whole[cell] = True
+    rows = np.flatnonzero(selection)
     weights = np.where(whole[rows], 1.0, THINNED)
     return _SomeCells(rows, np.maximum(scores[rows], least), weights)
 
