@@ -302,7 +302,7 @@ def test_similar_cells_are_neighbours() -> None:
 def test_blocks_without_likely_cells_do_not_change_the_result(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # There are several blocks, and some are skipped. The likely cells and their places are the same.
+    # Some of several blocks are skipped. The likely cells and their places are the same.
     columns = symbol_columns(build_index(large_city(9, 5000), named_noise("medium")))
     monkeypatch.setattr(lookalikes, "LIKELY_CELLS", 40)
     some = np.arange(0, 5000, 250)
