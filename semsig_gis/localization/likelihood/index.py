@@ -380,8 +380,9 @@ def gain_scorer(photo: View, levels: NoiseLevels, *, share: float = 1.0) -> _Sco
 
     arrays, model = photo_rows(photo, levels, share=share), levels.model
     length_of, lengths = levels.length_groups
+    shares = levels.level_shares
     remaining, leaving = (
-        part.reshape(len(part), COARSE_LEVELS, -1).mean(axis=2)
+        (part * shares).reshape(len(part), COARSE_LEVELS, -1).sum(axis=2)
         for part in (model.remaining, model.leaving)
     )
     near = model.detected[..., None] * np.float32(share)
@@ -404,6 +405,7 @@ def gain_scorer(photo: View, levels: NoiseLevels, *, share: float = 1.0) -> _Sco
     gain_rows(
         arrays.rows[0],
         arrays.masses,
+        shares,
         groups,
         chances[some],
         names[:, kinds],
@@ -644,6 +646,14 @@ class NoiseLevels:
         offsets = offsets.view()
         offsets.flags.writeable = False  # as those of a file, or kernels are compiled twice
         return BinnedObjects(offsets, self.table.row_of.astype(np.uint8)[codes], level_bins)
+
+    @cached_property
+    def level_shares(self) -> NDArray[np.float32]:
+        """The share of the distance units of each level among those of its coarse level."""
+        counts = np.bincount(self.level_of, minlength=DISTANCE_LEVELS)
+        counts = counts.reshape(COARSE_LEVELS, -1)
+        shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+        return shares.reshape(-1).astype(np.float32)
 
     @cached_property
     def length_groups(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:

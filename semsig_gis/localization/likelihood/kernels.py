@@ -205,6 +205,7 @@ def scan(  # noqa: PLR0917 - a kernel takes no keywords
 def gain_rows(  # noqa: C901, PLR0917 - a kernel takes no keywords
     rows: NDArray[np.float32],
     masses: NDArray[np.float32],
+    shares: NDArray[np.float32],
     groups: NDArray[np.int64],
     chances: NDArray[np.float32],
     naming: NDArray[np.float32],
@@ -216,13 +217,13 @@ def gain_rows(  # noqa: C901, PLR0917 - a kernel takes no keywords
 
     `rows`, shape (groups, levels, bins, LANES), and `masses`, which is empty for a full turn, have
     finer levels and bins; the mean of these masses is written to `means`, shape (groups, levels,
-    bins). `groups` is by kind, the `chances` of detection by length, kind and level, `naming` by
-    length, kind and lane. `scratch` is the same memory as floats and as integers.
+    bins). `shares` are the weights of the finer levels in these means. `groups` is by kind, the
+    `chances` of detection by length, kind and level, `naming` by length, kind and lane. `scratch`
+    is the same memory as floats and as integers.
     """
     floats, bits = scratch
     lengths, kinds, levels, bins, lanes = gains.shape
     many_levels, many_bins = rows.shape[1] // levels, rows.shape[2] // bins
-    share = np.float32(1.0 / (many_levels * many_bins))
     sums, one_f = np.empty(lanes, np.float32), np.float32(1.0)
     for group in range(len(rows)):
         for level in range(levels):
@@ -230,18 +231,18 @@ def gain_rows(  # noqa: C901, PLR0917 - a kernel takes no keywords
                 sums[:] = np.float32(0.0)
                 mass = np.float32(0.0)
                 for fine in range(level * many_levels, (level + 1) * many_levels):
+                    share = shares[fine] / np.float32(many_bins)
                     for step in range(bin_ * many_bins, (bin_ + 1) * many_bins):
                         for lane in range(lanes):
-                            sums[lane] += rows[group, fine, step, lane]
-                        mass += masses[group, fine, step] if masses.size else one_f
-                mass *= share
+                            sums[lane] += share * rows[group, fine, step, lane]
+                        mass += share * (masses[group, fine, step] if masses.size else one_f)
                 means[group, level, bin_] = mass
                 for kind in range(kinds):
                     if groups[kind] != group:
                         continue
                     for length in range(lengths):
                         chance = chances[length, kind, level]
-                        odds = share * chance / (one_f - chance * mass)
+                        odds = chance / (one_f - chance * mass)
                         for lane in range(lanes):
                             floats[lane] = one_f + odds * sums[lane] * naming[length, kind, lane]
                         # The first bits of a float are about its logarithm.

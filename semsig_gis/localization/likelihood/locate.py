@@ -54,6 +54,7 @@ from semsig_gis.localization.likelihood.index import (
     FIRST_TURNED_DETECTIONS,
     CellScores,
     is_plain,
+    own_sigma,
     photo_power,
 )
 from semsig_gis.localization.likelihood.posterior import (
@@ -607,7 +608,9 @@ class LikelihoodLocator:
             self.incremental is not None
             and index is self.index
             and all(
-                len(photo) <= FIRST_TURNED_DETECTIONS and not is_plain(photo)
+                len(photo) <= FIRST_TURNED_DETECTIONS
+                and own_sigma(photo, self.north_sigma) > 0.0
+                and not is_plain(photo)
                 for photo in View.of(reading.view).split()
             )
         ):
