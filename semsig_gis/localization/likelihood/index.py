@@ -653,7 +653,7 @@ class NoiseLevels:
         counts = np.bincount(self.level_of, minlength=DISTANCE_LEVELS)
         counts = counts.reshape(COARSE_LEVELS, -1)
         shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-        return shares.reshape(-1).astype(np.float32)
+        return np.asarray(shares.reshape(-1), np.float32)
 
     @cached_property
     def length_groups(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
