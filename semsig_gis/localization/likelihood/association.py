@@ -346,12 +346,11 @@ def rerank(
     log_prior: NDArray[np.float64] | None = None,
     count: int = RERANKED,
     off_centre: bool = True,
-    sample: int = SAMPLE,
 ) -> CellScores:
     """Replace the scores of the best cells by their one-to-one likelihoods.
 
     Up to `count` cells are re-ranked, until a batch of them has a negligible share of the chance. A
-    `sample` of the others is scored as well, and each other cell is shifted by as much as the cells
+    sample of the others is scored as well, and each other cell is shifted by as much as the cells
     of the sample with similar scores, so that all chances are comparable. `log_prior` helps to
     choose the cells and is not part of the result. Without bearings, the scores are returned as
     they are. The cells are chosen by quick one-to-one sums at the centres of some thousand (see
@@ -405,7 +404,7 @@ def rerank(
     loglik[choice[left]] = before[left] + ranked.move - prior[choice[left]]
     for cells, old, usual in ((choice[left], before[left], ranked.move), (rest, total[rest], move)):
         if len(cells) and log_sum(old) + usual > reached + LOG_LEAST_SHARE:
-            changed = old + _changes(rank, cells, old, size=sample)
+            changed = old + _changes(rank, cells, old)
             changed -= prior[cells]
             loglik[cells] = changed
     loglik[ranked.cells] = ranked.after - prior[ranked.cells]
@@ -470,19 +469,17 @@ def _changes(
     rank: Callable[[NDArray[np.int64], float], _Ranks],
     cells: NDArray[np.int64],
     before: NDArray[np.float64],
-    *,
-    size: int,
 ) -> NDArray[np.float64]:
-    """Return how much the scores of some cells change, by a sample of `size` of them.
+    """Return how much the scores of some cells change, by a sample of them.
 
     The scores are those of `_rank_best`.
     """
     # More of the likely cells than of the others, and the change of the chance by window.
-    pool = np.arange(0, len(cells), max(1, len(cells) // (POOL * size)))
+    pool = np.arange(0, len(cells), max(1, len(cells) // (POOL * SAMPLE)))
     pool = pool[np.argsort(-before[pool], kind="stable")]
-    ranks = np.unique(np.geomspace(1, len(pool), size).astype(np.int64)) - 1
+    ranks = np.unique(np.geomspace(1, len(pool), SAMPLE).astype(np.int64)) - 1
     sample = pool[ranks]
-    new, old, window = rank(cells[sample], -math.inf)[0], before[sample], size // WINDOWS
+    new, old, window = rank(cells[sample], -math.inf)[0], before[sample], SAMPLE // WINDOWS
     moves, levels = [], []
     for low in range(0, len(sample), window):
         part = slice(low, low + window)
